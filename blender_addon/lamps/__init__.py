@@ -9,17 +9,17 @@ lamps without a size that are missing from it; apart from that, forms stay corre
 
 from .filling import count, current_scene, ensure_group, follow, last_found, limit_by, refresh
 from .handlers import register, unregister
-from .lights import has_importance, is_sizeless
+from .kinds import of_light as kind_of
+from .kinds.light import has_importance
 from .scenes import lamps_of
 from .shared_group import find as find_group
 from .shared_group import is_shared as is_group
 from .shared_group import remove_unused as remove_unused_group
-from .sizes import SLACK, enlarge, is_tiny, sizeless, smallest
+from .sizes import enlarge, sizeless
 from .slots import NO_NEED, SLOTS, Lamp, by_slot, elsewhere, part_names, too_many
 
 __all__ = [
     "NO_NEED",
-    "SLACK",
     "SLOTS",
     "Lamp",
     "by_slot",
@@ -32,8 +32,7 @@ __all__ = [
     "follow",
     "has_importance",
     "is_group",
-    "is_sizeless",
-    "is_tiny",
+    "kind_of",
     "lamps_of",
     "last_found",
     "limit_by",
@@ -42,7 +41,6 @@ __all__ = [
     "register",
     "remove_unused_group",
     "sizeless",
-    "smallest",
     "too_many",
     "unregister",
 ]

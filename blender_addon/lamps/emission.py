@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How much light lights and materials emit, according to their nodes and settings."""
 
-import math
-
 import numpy as np
 
 from ..common import color
@@ -115,28 +113,17 @@ def may_shine(material):
     return any(found) or bool(found and animated(material.node_tree))
 
 
-def sides(light):
-    """Names of the properties for the two sizes of an area lamp."""
-    return "size", "size_y" if light.shape in {"RECTANGLE", "ELLIPSE"} else "size"
+def is_painted(item, emitting):
+    """Whether an object has one of the emissive materials."""
+    return any(slot.material in emitting for slot in item.material_slots)
 
 
-def _size(light):
-    """Area of a light, or solid angle of a sun: what its power is multiplied by if it is not
-    normalized; 0 if it has no size."""
-    if light.type == "SUN":
-        return math.pi * math.sin(light.angle / 2) ** 2
-    if light.type != "AREA":
-        return 4 * math.pi * light.shadow_soft_size**2
-    width, height = (getattr(light, side) for side in sides(light))
-    return width * height * (math.pi / 4 if light.shape in {"DISK", "ELLIPSE"} else 1.0)
-
-
-def of_light(light):
+def of_light(light, extent):
     """Power of a light times its colour, as an absolute value: closures aim also at lamps of
-    negative power. For a dark lamp that may light up, a very small number."""
+    negative power. For a dark lamp that may light up, a very small number. `extent`: area or solid
+    angle by which Cycles multiplies the light's power."""
     power = light.energy * _luminance(light.color) * 2.0 ** getattr(light, "exposure", 0.0)
-    if not light.normalize:
-        power *= _size(light) or 1.0
+    power *= extent
     if shader_trees.shading(light):
         power *= sum(
             _strength(shown, _EMITTERS["ShaderNodeEmission"])

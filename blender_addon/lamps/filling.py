@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import bpy
 
 from ..packs import device
-from . import scenes, shared_group, slots, world
+from . import kinds, scenes, shared_group, slots
+from .survey import Survey
 
 #: Number of values in a slot.
 _SIZE = 3 * len(slots.PARTS)
@@ -80,7 +81,7 @@ def _listed(survey, chosen, why=None):
 #: Result of the last survey and the session_uid of its scene; busy: whether the group is being
 #: filled.
 memory = SimpleNamespace(
-    scene=None, survey=scenes.Survey(), lamps=[], limit=slots.SLOTS, on_optix=False, busy=False
+    scene=None, survey=Survey(), lamps=[], limit=slots.SLOTS, on_optix=False, busy=False
 )
 
 
@@ -169,7 +170,7 @@ def refresh(scene):
     """Fills the slots of the shared group from a scene, and examines environment images anew.
     Returns every lamp of the scene as a slots.Lamp; those with a slot come first, then the
     brightest."""
-    world.forget_images()
+    kinds.forget()
     return quietly(scene, keep=False)
 
 

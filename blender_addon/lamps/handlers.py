@@ -5,7 +5,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..common import app_handlers
-from . import emission, filling, meshes, shared_group, slots
+from . import emission, filling, kinds, shared_group
 
 #: The scene being rendered.
 _rendering = None
@@ -15,29 +15,13 @@ def _concerns(update, scene):
     """Whether an update of the dependency graph may change the contents of the slots."""
     item, survey = update.id, filling.memory.survey
     if isinstance(item, bpy.types.Object):
-        if item.type == "LIGHT":
-            moved = update.is_updated_transform and not update.is_updated_geometry
-            if not moved:
-                return True
-            # Drivers follow transforms, unless their kind changes; a new ranking needs a survey.
-            kind = survey.kinds.get(item.original.name_full)
-            return (
-                slots.transform_kind(item.matrix_world) != kind
-                or (kind is not None and kind[1])
-                or item.original.name_full in survey.instancers
-                or len(survey.candidates) > filling.memory.limit
-            )
-        name = item.original.name_full
-        if name in survey.glowing or name in survey.instancers:
+        kind, crowded = kinds.of_object(item), len(survey.candidates) > filling.memory.limit
+        if kind is not None and kind.is_changed(update, survey, crowded):
             return True
-        if item.type == "EMPTY":
-            return update.is_updated_geometry and item.instance_type != "NONE"
-        if update.is_updated_geometry and item.type in meshes.TYPES:
-            return any(
-                s.material and survey.emission.get(s.material.name_full, 0.0) > 0
-                for s in item.material_slots
-            )
-        return False
+        if item.original.name_full in survey.instancers:
+            return True
+        changed = item.type == "EMPTY" and update.is_updated_geometry
+        return changed and item.instance_type != "NONE"
     if isinstance(item, bpy.types.Material):
         known = survey.emission.get(item.original.name_full, 0.0)
         even = item.original.name_full not in survey.uneven
@@ -55,8 +39,8 @@ def _concerns(update, scene):
 def _is_limited_anew(updates, scene):
     """Whether the number of lamps that materials can aim at may have changed. Counting takes time,
     so this looks only at changes of the device, a material or a setting."""
-    kinds = bpy.types.Scene | bpy.types.Material | bpy.types.NodeTree
-    if not filling.device_changed(scene) and not any(isinstance(u.id, kinds) for u in updates):
+    types = bpy.types.Scene | bpy.types.Material | bpy.types.NodeTree
+    if not filling.device_changed(scene) and not any(isinstance(u.id, types) for u in updates):
         return False
     return filling.limit_of(scene) != filling.memory.limit
 

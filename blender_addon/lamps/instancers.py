@@ -4,7 +4,7 @@ nodes."""
 
 import bpy
 
-from . import meshes
+from . import emission, kinds
 
 #: Maximum depth of nested collection instances.
 _DEPTH = 4
@@ -46,19 +46,17 @@ class Instancers:
             if modifier.type == "NODES" and modifier.node_group is not None:
                 found, made, painted = self._tree(modifier.node_group, depth)
                 values = _inputs_of(modifier)
-                painted = painted or self._is_painted(item)
+                painted = painted or emission.is_painted(item, self._emitting)
                 painted = painted or any(v in self._emitting for v in _blocks(values))
                 if found or (made and painted) or self._any(values, depth):
                     return True
         return False
 
-    def _is_painted(self, item):
-        return any(slot.material in self._emitting for slot in item.material_slots)
-
     def _shines(self, item, depth):
         if item is None:
             return False
-        if item.type == "LIGHT" or (item.type in meshes.TYPES and self._is_painted(item)):
+        kind = kinds.of_object(item)
+        if kind is not None and kind.may_shine(item, self._emitting):
             return True
         return depth < _DEPTH and self.places(item, depth + 1)
 

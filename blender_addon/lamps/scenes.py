@@ -2,14 +2,16 @@
 """Finds the lamps of a scene, and ranks them by their irradiance where the camera looks."""
 
 import math
-from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
 from mathutils import Vector
 
 from ..common.i18n import say
-from . import emission, instancers, lights, meshes, slots, world
+from . import emission, instancers, kinds, world
+from .kinds.light import Light
+from .kinds.mesh import FACED
+from .survey import Search, Survey
 
 #: Above this angular radius, uneven emission of a lamp matters: a lobe carries the mean of the
 #: model over the lamp.
@@ -17,21 +19,6 @@ _MAX_UNEVEN_SIZE = 0.05
 #: Ratio of radius to distance from which shaders leave a lamp to random rays (kNearest in
 #: generator/forms/aimed.h).
 _MAX_ANGULAR_SIZE = 0.85
-
-
-@dataclass
-class Survey:
-    """The lamps of a scene, and what handlers must know to recognize a change."""
-
-    candidates: list = field(default_factory=list)
-    emission: dict = field(default_factory=dict)  # radiance of materials, by name
-    uneven: set = field(default_factory=set)  # names of materials that emit unevenly
-    glowing: set = field(default_factory=set)  # names of emissive objects
-    instancers: set = field(default_factory=set)  # names of objects that instance lamps
-    kinds: dict = field(
-        default_factory=dict
-    )  # slots.transform_kind() of the lamps' transforms, by name
-    subject: object = None
 
 
 def _rendered(scene, found=None):
@@ -58,20 +45,21 @@ def _rendered(scene, found=None):
 
 def lamps_of(scene):
     """The lamp objects that are visible in the scene's renders."""
-    return [item for item in _rendered(scene) if lights.shines(item)]
+    found = [(item, kinds.of_object(item)) for item in _rendered(scene)]
+    return [item for item, kind in found if isinstance(kind, Light) and kind.shines(item)]
 
 
-def _subject(scene, shown, matrices):
+def _subject(scene, shown, matrix_of):
     """Points at which lamps are ranked: the centres of the four meshes nearest to the camera and in
     its view, or else of all meshes."""
     if not shown:
         return np.zeros((1, 3))
     boxes = [o.bound_box for o in shown]
     middles = [(Vector(box[0]) + Vector(box[6])) / 2 for box in boxes]  # opposite corners
-    centres = np.array([matrices(o) @ m for o, m in zip(shown, middles, strict=True)])
+    centres = np.array([matrix_of(o) @ m for o, m in zip(shown, middles, strict=True)])
     camera = scene.camera
     if camera is not None and camera.type == "CAMERA":
-        matrix, data = matrices(camera), camera.data
+        matrix, data = matrix_of(camera), camera.data
         to = centres - np.array(matrix.translation)
         depth = to @ -np.array(matrix.col[2].to_3d().normalized())
         aside = np.sqrt(np.maximum((to**2).sum(-1) - depth**2, 0))
@@ -108,49 +96,24 @@ def shown_with(scene):
     return list(dict.fromkeys(s for s in found if s is not None and s != scene))
 
 
-def survey_lamps(scene, depsgraph, subject=None):
-    """A Survey of a scene. `subject`: points of an earlier survey, so that they need not be
-    determined."""
-    survey = Survey(subject=subject)
+def _copies(search):
+    """Candidates of what objects instance."""
+    found = {kind: [] for kind in kinds.KINDS}
+    for instance in search.depsgraph.object_instances:
+        item, parent = instance.object, instance.parent
+        if not instance.is_instance or item.hide_render:
+            continue
+        if parent is None or parent.original.hide_render:
+            continue
+        kind = kinds.of_object(item)
+        copy = kind.of_copy(instance, search) if kind is not None else None
+        if copy is not None:
+            found[kind].append(copy)
+    return [candidate for kind, copies in found.items() for candidate in kind.of_copies(copies)]
 
-    def matrices(item):
-        return item.evaluated_get(depsgraph).matrix_world if depsgraph else item.matrix_world
 
-    survey.emission = {m.name_full: emission.of_material(m) for m in bpy.data.materials}
-    emitting = {m: e for m in bpy.data.materials if (e := survey.emission[m.name_full]) > 0}
-    survey.uneven = {m.name_full for m in emitting if not emission.is_even(m)}
-    shown, placing = [], instancers.Instancers(emitting)
-    for item in _rendered(scene):
-        kind = item.type
-        if item.parent is not None and item.parent.instance_type in {"VERTS", "FACES"}:
-            continue  # only its instances are rendered
-        if kind == "LIGHT":
-            if lights.shines(item):
-                matrix = matrices(item).copy()
-                survey.kinds[item.name_full] = slots.transform_kind(matrix)
-                survey.candidates.append(lights.candidate_of(item, item.name, item.data, matrix))
-        elif kind in meshes.TYPES:
-            if item.hide_render:
-                continue
-            glows = emitting and any(m in emitting for m in meshes.materials_of(item, depsgraph))
-            if glows and (
-                made := meshes.candidate_of(item, emitting, matrices(item).copy(), depsgraph)
-            ):
-                survey.glowing.add(item.name_full)
-                survey.candidates.append(made)
-            elif subject is None:
-                shown.append(item)
-        if placing.places(item):
-            survey.instancers.add(item.name_full)
-    if survey.subject is None:
-        survey.subject = _subject(scene, shown, matrices)
-    if survey.instancers and depsgraph:
-        survey.candidates += lights.instances(depsgraph)
-        if emitting:
-            survey.candidates += meshes.instances(
-                depsgraph, emitting, survey.subject, survey.glowing
-            )
-    survey.candidates += world.candidates(scene.world)
+def _judge(survey):
+    """Ranks candidates, and finds those that shaders can't aim at."""
     for candidate in survey.candidates:
         if candidate.judge is not None:
             candidate.judge(survey.subject)
@@ -164,5 +127,35 @@ def survey_lamps(scene, depsgraph, subject=None):
             candidate.why = say("its light is not the same all over it")
         elif not met and angle > _MAX_ANGULAR_SIZE:
             candidate.why = say("it looks too large for a closure")
+
+
+def survey_lamps(scene, depsgraph, subject=None):
+    """A Survey of a scene. `subject`: points of an earlier survey, so that they need not be
+    determined."""
+    survey = Survey(subject=subject)
+    survey.emission = {m.name_full: emission.of_material(m) for m in bpy.data.materials}
+    emitting = {m: e for m in bpy.data.materials if (e := survey.emission[m.name_full]) > 0}
+    survey.uneven = {m.name_full for m in emitting if not emission.is_even(m)}
+    search = Search(survey, depsgraph, emitting)
+    shown, placing = [], instancers.Instancers(emitting)
+    for item in _rendered(scene):
+        if item.parent is not None and item.parent.instance_type in {"VERTS", "FACES"}:
+            continue  # only its instances are rendered
+        if item.type in FACED and item.hide_render:
+            continue
+        kind = kinds.of_object(item)
+        candidate = kind.of_object(item, search) if kind is not None else None
+        if candidate is not None:
+            survey.candidates.append(candidate)
+        elif item.type in FACED:
+            shown.append(item)
+        if placing.places(item):
+            survey.instancers.add(item.name_full)
+    if survey.subject is None:
+        survey.subject = _subject(scene, shown, search.matrix)
+    if survey.instancers and depsgraph:
+        survey.candidates += _copies(search)
+    survey.candidates += world.candidates(scene.world)
+    _judge(survey)
     survey.candidates.sort(key=lambda c: (-c.rank, c.name))
     return survey

@@ -1,46 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sizes of Blender's lights, as far as random rays depend on them."""
+"""Lamps that are too small for random rays: finds and enlarges them."""
 
 import bpy
 
-from .lights import is_sizeless
+from . import kinds
 from .scenes import lamps_of
-
-#: Lamps below this size (metres; radians for a sun) are too rarely hit by random rays.
-SMALL_LIGHT = 0.01
-SMALL_SUN = 0.02
-#: Sizes are stored in single precision.
-SLACK = 1e-6
-
-
-def _sizes_of(light):
-    """Names of the properties that make up a light's size."""
-    if light.type == "SUN":
-        return ("angle",)
-    if light.type == "AREA":
-        return ("size", "size_y") if light.shape in {"RECTANGLE", "ELLIPSE"} else ("size",)
-    return ("shadow_soft_size",)
-
-
-def smallest(light):
-    """The smallest of a light's sizes."""
-    return min(getattr(light, name) for name in _sizes_of(light))
-
-
-def _least_size(light):
-    """The size from which random rays hit a light often enough."""
-    return SMALL_SUN if light.type == "SUN" else SMALL_LIGHT
-
-
-def is_tiny(light):
-    """Whether random rays hit a light too rarely."""
-    return smallest(light) < _least_size(light) * (1 - SLACK)
 
 
 def sizeless():
     """Names of the visible lamps of the open file that random rays can't hit."""
     found = {item for scene in bpy.data.scenes for item in lamps_of(scene)}
-    return sorted({item.name for item in found if is_sizeless(item.data)})
+    return sorted({o.name for o in found if kinds.of_object(o).is_sizeless(o.data)})
 
 
 def enlarge(scene):
@@ -49,12 +19,11 @@ def enlarge(scene):
     file."""
     done, kept = [], []
     for item in lamps_of(scene):
-        light = item.data
-        if not is_tiny(light):
+        kind, light = kinds.of_object(item), item.data
+        if not kind.is_tiny(light):
             continue
-        least = _least_size(light)
         if light.is_editable:
-            for name in _sizes_of(light):
-                setattr(light, name, max(getattr(light, name), least))
+            for name in kind.sizes(light):
+                setattr(light, name, max(getattr(light, name), kind.least_size))
         (done if light.is_editable else kept).append(item.name)
     return done, kept

@@ -14,7 +14,8 @@ from ..common.i18n import say
 SLOTS = 8
 #: Names of a slot's vectors, to which the slot's number, from 1, is appended.
 PARTS = ("LampPlace", "LampTurn", "LampScale", "LampShape")
-#: Kinds of lamps, as numbered in the shaders (osl/brdfc.osl.in, brdfc_lamp).
+#: Shapes of lamps, as numbered in the shaders (osl/brdfc.osl.in, brdfc_lamp). What the number in a
+#: slot is above a whole one belongs to the kinds that have that shape (kinds/).
 EMPTY, BALL, SUN, RECTANGLE, ELLIPSE, SKY_SUN = range(6)
 
 
@@ -90,7 +91,8 @@ class Candidate:
     sizeless: bool = False
     met: bool = True  # random rays hit it
     uneven: bool = False  # its emission is not uniform
-    #: For a mesh: judge(points) sets the values and `why`, given points (n, 3) of the subject.
+    #: If they depend on the subject, judge(points) sets the values and `why`, given its points,
+    #: (n, 3).
     judge: object = None
 
 
@@ -109,9 +111,9 @@ def angular_size_distant(angle):
     return lambda points: np.full(len(points), math.tan(angle / 2))
 
 
-def numbers(kind, place=(0, 0, 0), turn=(0, 0, 0), scale=(1, 1, 1), sizes=(0, 0)):
-    """The twelve numbers of a slot, in the order of PARTS. The kind may be Driven."""
-    return (*place, *turn, *scale, kind if isinstance(kind, Driven) else float(kind), *sizes)
+def numbers(shape, place=(0, 0, 0), turn=(0, 0, 0), scale=(1, 1, 1), sizes=(0, 0)):
+    """The twelve numbers of a slot, in the order of PARTS. The shape may be Driven."""
+    return (*place, *turn, *scale, shape if isinstance(shape, Driven) else float(shape), *sizes)
 
 
 def turned(direction):

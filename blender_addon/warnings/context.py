@@ -13,8 +13,6 @@ from ..lamps import emission
 from ..packs import device, pack
 from . import closure_pool
 
-#: Power and radius of a new lamp in Blender.
-NEW_LAMP = 1000, 0.1
 #: Nodes of a world with a uniform colour.
 _PLAIN_WORLD = {"ShaderNodeBackground", "ShaderNodeOutputWorld"}
 
@@ -61,19 +59,13 @@ class SceneContext:
         by a uniform world no brighter than white. Measured for such a scene with a floor
         (fresnel_conductor, schlick, coupled, radziszewski_alda): a clamp at 10 takes no light, and
         Filter Glossy at 1 changes blocks of 8 x 8 pixels by at most 0.6 %."""
-        watts, radius = NEW_LAMP
         found = [item.data for item in self.lamps]
         world = self.scene.world
         plain = nodes.all_nodes(world) if world else []
         colors = [n.inputs for n in plain if n.bl_idname == "ShaderNodeBackground"]
         return (
             bool(found)
-            and all(
-                data.type == "POINT"
-                and data.energy <= watts
-                and data.shadow_soft_size >= radius * (1 - 1e-6)
-                for data in found
-            )
+            and all(lamps.kind_of(data).is_like_new(data) for data in found)
             and {n.bl_idname for n in plain} <= _PLAIN_WORLD
             and all(
                 max(sockets["Color"].default_value[:3]) * sockets["Strength"].default_value <= 1

@@ -5,13 +5,6 @@ from .. import lamps
 from ..common.i18n import say
 from ..groups import nodes
 
-#: Up to this size (metres; radians for a sun), an ideal mirror shows lamps as dots. A new lamp in
-#: Blender is larger (0.1): with its 4,096 samples, blocks of 8 x 8 pixels differ by less than 1 %.
-SMALL_IN_MIRROR = 0.05
-SMALL_SUN_IN_MIRROR = 0.02
-#: From this angle on (radians), a sun that random rays do not meet is noisy in highlights: its
-#: light is that of one closure, with f towards one random point of the sun.
-WIDE_SUN = 0.5
 #: Fraction of the scene's light below which the noise of a lamp is invisible among the others.
 DIM = 0.05
 #: Fraction of the scene's light that may be lost without a warning.
@@ -96,9 +89,7 @@ def wide_suns(at):
         [
             item
             for item in (at.lamps if at.aims else ())
-            if item.data.type == "SUN"
-            and item.data.angle > WIDE_SUN
-            and not lamps.has_importance(item.data)
+            if lamps.kind_of(item.data).is_wide(item.data) and not lamps.has_importance(item.data)
         ]
     )
 
@@ -111,12 +102,7 @@ def small_in_mirror(at):
     Those without a size do not appear in mirrors."""
     if "clamp_mirror" not in at.cycles_form.get("warnings", []):
         return []
-
-    def is_small(light):
-        limit = SMALL_SUN_IN_MIRROR if light.type == "SUN" else SMALL_IN_MIRROR
-        return 0 < lamps.smallest(light) <= limit * (1 + lamps.SLACK)
-
-    return _any([item for item in at.lamps if is_small(item.data)])
+    return _any([x for x in at.lamps if lamps.kind_of(x.data).is_dot_in_mirror(x.data)])
 
 
 def _without_shadow(at):
@@ -127,7 +113,7 @@ def _without_shadow(at):
         for item in at.lamps
         if not item.data.use_shadow
         and lamps.has_importance(item.data)
-        and not lamps.is_sizeless(item.data)
+        and not lamps.kind_of(item.data).is_sizeless(item.data)
     ]
 
 
@@ -152,7 +138,7 @@ def hidden_from_rays(at):
 
 def small_lamps(at):
     """Lamps are below 1 cm, or suns below 0.02 rad: random rays hit them too rarely."""
-    return _any([item for item in at.lamps if lamps.is_tiny(item.data)])
+    return _any([item for item in at.lamps if lamps.kind_of(item.data).is_tiny(item.data)])
 
 
 def without_importance(at):

@@ -540,15 +540,16 @@ def test_spot_of_an_environment_image(extension, ball, empty):
     tree.links.new(mapping.outputs["Vector"], node.inputs["Vector"])
     rotation = mapping.inputs["Rotation"].default_value
     rotation[:] = (0.2, 0.1, 0.8)
-    for kind in ("POINT", "TEXTURE"):
+    for kind in ("POINT", "TEXTURE", "VECTOR", "NORMAL"):
         mapping.vector_type = kind
         turn = np.array(rotation.to_matrix())
-        turn = turn if kind == "POINT" else turn.T
+        turn = turn.T if kind == "TEXTURE" else turn
         (slot,) = slots(empty)
         assert turn @ axes(slot)[:, 2] == pytest.approx(direction, abs=5e-3)
     bright = extension.api.see_lamps(empty)[0].irradiance
     background.inputs["Strength"].default_value = 3.0
     assert extension.api.see_lamps(empty)[0].irradiance == pytest.approx(3 * bright)
+    mapping.vector_type = "POINT"
     mapping.inputs["Location"].default_value = (0.3, 0, 0)
     assert slots(empty) == []
     noise = tree.nodes.new("ShaderNodeTexNoise")
@@ -993,6 +994,59 @@ def test_copies_of_what_shines(extension, ball, empty, place):
         return
     assert sorted(tuple(s[:3].round(4)) for s in numbers) == sorted(places)
     assert {s[9] for s in numbers} == {3}
+
+
+def test_a_new_kind_of_lamp(extension, lamps, ball, empty, monkeypatch):
+    """All of it is in one class: what it reads, its slot, its copies, and what changes it."""
+    kinds, parts = (import_module(f"{lamps.__name__}.{name}") for name in ("kinds", "slots"))
+
+    class Loud(import_module(f"{kinds.__name__}.kind").Kind):
+        objects, nodes = frozenset({"SPEAKER"}), frozenset({"ShaderNodeTexMagic"})
+
+        def candidate(self, name, values, why=""):
+            far = parts.angular_size_distant(0.1)
+            return parts.Candidate(name, values, lambda points: np.ones(len(points)), far, why)
+
+        def of_object(self, item, search):
+            placed = parts.placed(item, search.matrix(item).copy())
+            sizes = 0.5 * item.scale.x, 0.0
+            return self.candidate(item.name, parts.numbers(parts.BALL, *placed, sizes))
+
+        def of_copy(self, instance, search):
+            placed = parts.placed(None, instance.matrix_world.copy())
+            values = parts.numbers(parts.BALL, *placed, (0.25, 0.0))
+            return self.candidate(search.name_of(instance), values)
+
+        def may_shine(self, item, emitting):
+            return True
+
+        def is_changed(self, update, survey, crowded):
+            return update.is_updated_transform
+
+        def of_node(self, shown, strength):
+            yield self.candidate(shown.node.name, None, f"strength {strength:g}")
+
+    item = bpy.data.objects.new("Voice", bpy.data.speakers.new("Voice"))
+    item.location = (1, 2, 3)
+    empty.collection.objects.link(item)
+    assert slots(empty) == []
+    monkeypatch.setattr(kinds, "KINDS", (*kinds.KINDS, Loud()))
+    assert [(x.name, x.slot) for x in extension.api.see_lamps(empty)] == [("Voice", 1)]
+    assert slots(empty)[0] == pytest.approx([1, 2, 3, 0, 0, 0, 1, 1, 1, 1, 0.5, 0])
+    item.location.x, item.scale.x = 4, 1.5
+    assert slots(empty)[0] == pytest.approx([4, 2, 3, 0, 0, 0, 1.5, 1, 1, 1, 0.75, 0])
+    shown = bpy.data.objects.new("Copy", None)
+    shown.instance_type, shown.location = "COLLECTION", (0, 0, 2)
+    shown.instance_collection = in_collection(empty, item)
+    empty.collection.objects.link(shown)
+    bpy.context.view_layer.update()
+    assert [x.name for x in extension.api.see_lamps(empty)] == ["Copy/Voice"]
+    assert slots(empty)[0] == pytest.approx([4, 2, 5, 0, 0, 0, 1.5, 1, 1, 1, 0.25, 0])
+    tree, background = helpers.add_world(empty, 3.0)
+    magic = tree.nodes.new("ShaderNodeTexMagic")
+    tree.links.new(magic.outputs["Color"], background.inputs["Color"])
+    found = {x.name: (x.slot, x.why) for x in extension.api.see_lamps(empty)}
+    assert found == {"Copy/Voice": (1, ""), "Magic Texture": (None, "strength 3")}
 
 
 def bulb(scene, at=(0, 0, 0)):

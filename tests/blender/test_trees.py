@@ -524,13 +524,13 @@ def glowing(empty):
 
 
 def test_the_power_of_a_lamp_is_what_reaches_it(extension, glowing):
-    emission = import_module(f"{extension.package}.lamps.emission")
     light, link = glowing
-    assert emission.of_light(light) == pytest.approx(50, rel=1e-4)
+    kind = import_module(f"{extension.package}.lamps").kind_of(light)
+    assert kind.power(light) == pytest.approx(50, rel=1e-4)
     link.is_muted = True
-    assert emission.of_light(light) == pytest.approx(10, rel=1e-4)
+    assert kind.power(light) == pytest.approx(10, rel=1e-4)
     link.to_node.mute = True
-    assert emission.of_light(light) == 0
+    assert kind.power(light) == 0
 
 
 def test_a_muted_glow_is_no_lamp(extension, empty):

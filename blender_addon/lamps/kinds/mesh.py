@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from mathutils import Matrix, Vector, geometry
 
-from ..common.i18n import say
-from . import emission, slots
+from ...common.i18n import say
+from .. import emission, slots
+from .kind import Kind
 
 #: A lobe covers the whole bounding ball of a mesh, and averages the model and the visible part of
 #: the lamp separately. So a mesh must fill its ball well, as a cube does, or look small; a mesh
@@ -19,8 +20,8 @@ _LOOKS_SMALL, _LOOKS_LARGE, _LOOKS_WIDE = 0.03, 0.3, 0.4
 #: The same for rectangles and ellipses: the fraction of its bounding rectangle that a flat mesh
 #: must fill, and its maximum thickness relative to the shorter side.
 _FILLS_RECTANGLE, _FILLS_ELLIPSE, _THICK = 0.95, 0.7, 0.1
-#: Object types that have faces.
-TYPES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
+#: Types of objects that have faces.
+FACED = frozenset({"MESH", "CURVE", "SURFACE", "META", "FONT"})
 
 
 def _evaluated(item, depsgraph):
@@ -37,7 +38,7 @@ def _own_materials(item):
     return [m.original if m is not None else None for m in found]
 
 
-def materials_of(item, depsgraph):
+def _materials_of(item, depsgraph):
     """Materials of an object's faces by index, including those that geometry nodes assign."""
     if item.type == "MESH" and any(m.type == "NODES" for m in item.modifiers):
         found = _evaluated(item, depsgraph).data.materials
@@ -161,57 +162,72 @@ def _main_axis(places):
     return math.atan2(2 * covariance[0, 1], covariance[0, 0] - covariance[1, 1]) / 2
 
 
-def candidate_of(item, emitting, matrix, depsgraph):
-    """An emissive object as a ball or a flat lamp; None if none of its faces emits."""
-    own, materials = _evaluated(item, depsgraph), materials_of(item, depsgraph)
-    shape = _shape(own, materials, emitting)
-    return _candidate(item, item.name, shape, matrix) if shape is not None else None
-
-
 #: Number of instances that are examined one by one; the brightest are chosen.
 _COPIES = 4 * slots.SLOTS
 
 
-def instances(depsgraph, emitting, subject, sources):
-    """A candidate for each emissive instance; if there are many, one each for the brightest and a
-    single one for all others. `subject`: its points, (n, 3). Adds the names of instanced objects to
-    `sources`."""
-    shapes, found = {}, []
-    for instance in depsgraph.object_instances:
-        item = instance.object
-        if not instance.is_instance or item.type not in TYPES:
-            continue
-        parent = instance.parent
-        if parent is None or parent.original.hide_render or item.hide_render:
-            continue
+class Mesh(Kind):
+    objects = FACED
+
+    def of_object(self, item, search):
+        materials = _materials_of(item, search.depsgraph) if search.emitting else []
+        if not any(m in search.emitting for m in materials):
+            return None
+        shape = _shape(_evaluated(item, search.depsgraph), materials, search.emitting)
+        if shape is None:
+            return None
+        search.survey.glowing.add(item.name_full)
+        return _candidate(item, item.name, shape, search.matrix(item).copy())
+
+    def of_copy(self, instance, search):
+        """Its light at the subject, name, shape and matrix."""
+        if not search.emitting:
+            return None
+        item, shapes = instance.object, search.shared
         key = item.data.as_pointer() if item.data is not None else 0
         if key not in shapes:
-            shapes[key] = _shape(item, _own_materials(item), emitting)
+            shapes[key] = _shape(item, _own_materials(item), search.emitting)
         if shapes[key] is None:
-            continue
-        sources.add(item.original.name_full)
+            return None
+        search.survey.glowing.add(item.original.name_full)
         matrix = instance.matrix_world.copy()
         middle, radius = shapes[key].ball()
-        away = np.array(matrix @ Vector(middle)) - subject
+        away = np.array(matrix @ Vector(middle)) - search.survey.subject
         size = radius * max(abs(s) for s in matrix.to_scale())
         squared = np.maximum((away**2).sum(-1), max(size**2, 1e-12))
         light = float(np.mean(shapes[key].radiance * math.pi * size**2 / squared))
-        found.append((light, f"{parent.name}/{item.name}", shapes[key], matrix))
-    found.sort(key=lambda copy: -copy[0])
-    for _, name, shape, matrix in found[:_COPIES]:
-        yield _candidate(None, name, shape, matrix)
-    if others := found[_COPIES:]:
-        name = others[0][1]
-        if others[1:]:
-            name = say("{lamps} and {count} more", lamps=name, count=len(others) - 1)
-        all_light = sum(copy[0] for copy in others)
-        nothing = slots.angular_size_distant(0.0)
-        yield slots.Candidate(
-            name,
-            None,
-            lambda points: np.full(len(points), all_light),
-            nothing,
-            why=slots.too_many(slots.SLOTS),
+        return light, search.name_of(instance), shapes[key], matrix
+
+    def of_copies(self, found):
+        """If there are many, one each for the brightest and a single one for all others."""
+        found = sorted(found, key=lambda copy: -copy[0])
+        for _, name, shape, matrix in found[:_COPIES]:
+            yield _candidate(None, name, shape, matrix)
+        if others := found[_COPIES:]:
+            name = others[0][1]
+            if others[1:]:
+                name = say("{lamps} and {count} more", lamps=name, count=len(others) - 1)
+            all_light = sum(copy[0] for copy in others)
+            nothing = slots.angular_size_distant(0.0)
+            yield slots.Candidate(
+                name,
+                None,
+                lambda points: np.full(len(points), all_light),
+                nothing,
+                why=slots.too_many(slots.SLOTS),
+            )
+
+    def may_shine(self, item, emitting):
+        return emission.is_painted(item, emitting)
+
+    def is_changed(self, update, survey, crowded):
+        item = update.id
+        return item.original.name_full in survey.glowing or (
+            update.is_updated_geometry
+            and any(
+                s.material and survey.emission.get(s.material.name_full, 0.0) > 0
+                for s in item.material_slots
+            )
         )
 
 

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Area lights: rectangles and ellipses that shine on one side, within an angle, their Spread."""
+
+import math
+
+import numpy as np
+
+from .. import slots
+from .light import ASIDE, Light, seen_from
+
+
+def _is_round(light):
+    return light.shape in {"DISK", "ELLIPSE"}
+
+
+class Area(Light):
+    objects = frozenset({"AREA"})
+
+    def sizes(self, light):
+        return "size", "size_y" if light.shape in {"RECTANGLE", "ELLIPSE"} else "size"
+
+    def extent(self, light):
+        width, height = (getattr(light, side) for side in self.sizes(light))
+        return width * height * (math.pi / 4 if _is_round(light) else 1.0)
+
+    def slot(self, light, placed, sign):
+        shape = slots.ELLIPSE if _is_round(light) else slots.RECTANGLE
+        first, second = self.sizes(light)
+        sizes = slots.Driven(light, first, sign), slots.Driven(light, second)
+        # The shader finds what the spread lacks of half a turn, in turns, in what the number of the
+        # shape is above a whole one.
+        spread = slots.Driven(light, "spread", -0.5 / math.pi, shape + 0.5)
+        return slots.numbers(spread, *placed, sizes)
+
+    def irradiance(self, light, matrix, power, points):
+        squared, along = seen_from(points, matrix)
+        return power / math.pi / squared * np.maximum(along, ASIDE)
+
+    def angular_size(self, light, matrix):
+        scaled = (
+            getattr(light, side) * scale
+            for side, scale in zip(self.sizes(light), matrix.to_scale(), strict=False)
+        )
+        return slots.angular_size_at(matrix.translation, math.hypot(*scaled) / 2)
+
+    def is_sizeless(self, light):
+        return False
+
+    def is_lamp(self, light):
+        return not light.cycles.is_portal and super().is_lamp(light)

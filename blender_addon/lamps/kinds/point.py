@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Point lights: balls that shine in all directions alike."""
+
+import math
+
+from .. import slots
+from .light import Light, seen_from
+
+#: Power and radius of a new light in Blender.
+_NEW = 1000, 0.1
+
+
+class Point(Light):
+    objects = frozenset({"POINT"})
+
+    def sizes(self, light):
+        return ("shadow_soft_size",)
+
+    def extent(self, light):
+        return 4 * math.pi * light.shadow_soft_size**2
+
+    def slot(self, light, placed, sign):
+        radius = slots.Driven(light, "shadow_soft_size", sign)
+        return slots.numbers(slots.BALL, *placed, (radius, 0.0))
+
+    def irradiance(self, light, matrix, power, points):
+        squared, _ = seen_from(points, matrix)
+        return power / (4 * math.pi) / squared
+
+    def angular_size(self, light, matrix):
+        return slots.angular_size_at(matrix.translation, light.shadow_soft_size)
+
+    def is_like_new(self, light):
+        watts, radius = _NEW
+        return light.energy <= watts and light.shadow_soft_size >= radius * (1 - 1e-6)
