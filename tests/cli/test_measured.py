@@ -594,7 +594,9 @@ def test_sums_of_lobes_are_told(tmp_path):
     file = lobe_table(tmp_path, matte=[0.1, 0.05, 0.02])
     done = run("measured", file, "--json", "--lobes", "2")
     assert done.returncode == 0, done.stderr
-    assert re.findall(r"^brdfc measured: (\d)/2 ", done.stderr, re.M) == ["1", "2"]
+    # Two searches for two lobes each; the second may be left out.
+    steps = [int(k) for k in re.findall(r"^brdfc measured: (\d)/4 ", done.stderr, re.M)]
+    assert steps[:2] == [1, 2] and steps == sorted(steps) and steps[-1] == 4
     said = json.loads(done.stdout)
     one, two = said["sums"]
     assert said["fits"] == [] and two["error"] < 0.01 < 0.1 < one["error"]
