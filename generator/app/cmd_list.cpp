@@ -6,15 +6,12 @@
 #include "core/error.h"
 #include "forms/form.h"
 #include "model/model.h"
+#include "pack/manifest.h"
 
 namespace brdfc::app {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-const char* kind_name(ParamKind k) {
-  return k == ParamKind::Number ? "number" : k == ParamKind::Color ? "color" : "choice";
-}
 
 std::vector<std::string> names_of_forms(const Model& m) {
   std::vector<std::string> names;
@@ -25,26 +22,7 @@ std::vector<std::string> names_of_forms(const Model& m) {
 Json describe(const Model& m) {
   const ModelInfo& info = m.info();
   Json params = Json::array();
-  for (const ParamInfo& p : info.params) {
-    Json j{{"name", p.name}, {"label", p.label}, {"kind", kind_name(p.kind)}, {"unit", p.unit}};
-    if (p.kind == ParamKind::Choice) {
-      j["choices"] = p.choices;
-      j["default"] = p.choices[std::size_t(p.value[0])];
-    } else {
-      j["min"] = p.min;
-      j["max"] = p.max;
-      j["soft_min"] = p.soft_min;
-      j["soft_max"] = p.soft_max;
-      if (p.kind == ParamKind::Color)
-        j["default"] = p.value;
-      else
-        j["default"] = p.value[0];
-      if (p.kind == ParamKind::Number) j["by_factors"] = p.by_factors;
-    }
-    j["doc"] = p.doc;
-    if (!p.panel.empty()) j["panel"] = p.panel;
-    params.push_back(std::move(j));
-  }
+  for (const ParamInfo& p : info.params) params.push_back(pack::parameter_json(p));
   const ModelProperties& q = info.properties;
   return {{"name", info.name},
           {"label", info.label},
@@ -89,7 +67,7 @@ void print_text(const Model& m) {
       value = p.kind == ParamKind::Color ? fmt::format("{:g},{:g},{:g}", p.value[0], p.value[1], p.value[2])
                                          : fmt::format("{:g}", p.value[0]);
     }
-    fmt::print("    {:<12} {:<7} {:<36} default {:<16} {}\n", p.name, kind_name(p.kind), range, value, p.doc);
+    fmt::print("    {:<12} {:<7} {:<36} default {:<16} {}\n", p.name, pack::name_of(p.kind), range, value, p.doc);
   }
   fmt::print("\n");
 }

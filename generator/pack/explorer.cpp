@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "pack/addon.h"
+#include "pack/manifest.h"
 #include "pack/recorded_model.h"
 #include "pack/target.h"
 #include "print/glsl.h"
@@ -17,7 +18,6 @@ namespace brdfc::pack {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 using print::GlslArgument;
 
 constexpr const char* kMadeBy = "// Made by brdfc ";
@@ -33,30 +33,6 @@ std::string base64(const std::vector<double>& values) {
   out.resize(
       std::size_t(EVP_EncodeBlock(reinterpret_cast<unsigned char*>(out.data()), bytes.data(), int(bytes.size()))));
   return out;
-}
-
-Json parameter(const ParamInfo& p) {
-  Json j{{"name", p.name}, {"label", p.label}, {"unit", p.unit}, {"doc", p.doc}};
-  switch (p.kind) {
-    case ParamKind::Number:
-      j["kind"] = "number";
-      j["default"] = p.value[0];
-      j["min"] = p.min;
-      j["max"] = p.max;
-      j["soft_min"] = p.soft_min;
-      j["soft_max"] = p.soft_max;
-      j["scale"] = brdfc::name_of(p.slider().scale);
-      break;
-    case ParamKind::Color:
-      j["kind"] = "color";
-      j["default"] = p.value;
-      break;
-    default:
-      j["kind"] = "choice";
-      j["default"] = p.choices[std::size_t(p.value[0])];
-      j["choices"] = p.choices;
-  }
-  return j;
 }
 
 /// The GLSL functions of a model; functions with the same text are written once.
@@ -127,7 +103,7 @@ class Functions {
 Json described(const Model& model, print::Tables& tables) {
   const ModelInfo& info = model.info();
   Json parameters = Json::array(), formulas = Json::object();
-  for (const ParamInfo& p : info.params) parameters.push_back(parameter(p));
+  for (const ParamInfo& p : info.params) parameters.push_back(parameter_json(p));
   Functions functions(model, tables);
   for (const Choices& choices : choice_combinations(info)) {
     std::string key, suffix;

@@ -47,20 +47,14 @@ Readers readers(const Model& model) {
   return found;
 }
 
+}  // namespace
+
+const char* name_of(ParamKind k) {
+  return k == ParamKind::Number ? "number" : k == ParamKind::Color ? "color" : "choice";
+}
+
 Json parameter_json(const ParamInfo& p) {
-  Json j = {{"name", p.name}, {"label", p.label}};
-  switch (p.kind) {
-    case ParamKind::Number:
-      j["kind"] = "number";
-      break;
-    case ParamKind::Color:
-      j["kind"] = "color";
-      break;
-    case ParamKind::Choice:
-      j["kind"] = "choice";
-      break;
-  }
-  j["unit"] = p.unit;
+  Json j = {{"name", p.name}, {"label", p.label}, {"kind", name_of(p.kind)}, {"unit", p.unit}};
   if (p.kind == ParamKind::Choice) {
     j["default"] = p.choices[std::size_t(p.value[0])];
     j["choices"] = p.choices;
@@ -70,14 +64,16 @@ Json parameter_json(const ParamInfo& p) {
     j["soft_min"] = p.soft_min;
     j["soft_max"] = p.soft_max;
     j["default"] = p.kind == ParamKind::Color ? Json(p.value) : Json(p.value[0]);
+    if (p.kind == ParamKind::Number) {
+      j["by_factors"] = p.by_factors;
+      j["scale"] = name_of(p.slider().scale);
+    }
   }
   j["doc"] = p.doc;
   if (p.optical != Optical::None) j["optical"] = name_of(p.optical);
   if (!p.panel.empty()) j["panel"] = p.panel;
   return j;
 }
-
-}  // namespace
 
 Json parameters_json(const Model& model, const ParamValues& fixed) {
   Json list = Json::array();

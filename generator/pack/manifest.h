@@ -17,6 +17,9 @@ using Json = nlohmann::ordered_json;
 
 /// All looks that a model may declare, in the order of menus.
 Json looks_json();
+const char* name_of(ParamKind);
+/// A parameter as every output in JSON describes it.
+Json parameter_json(const ParamInfo&);
 /// The parameters that are not fixed. `needs` of a parameter lists, by choice, the options under which a formula reads
 /// it.
 Json parameters_json(const Model&, const ParamValues& fixed);
