@@ -78,8 +78,11 @@ class ProgramJob(Job):
         return self._log_file.read_text(encoding="utf-8", errors="replace")
 
     def _last_words(self, status):
-        """The last output of a program that failed."""
-        return (self._log().strip().splitlines() or [f"exit status {status}"])[-1]
+        """The last output of a program that failed; that of one that crashed is about its work."""
+        words = self._log().strip().splitlines()
+        if status < 0 or not words:  # negative: ended by a signal
+            return f"exit status {status}"
+        return words[-1]
 
     def step(self):
         if self.result is not None:

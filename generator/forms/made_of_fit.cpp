@@ -36,6 +36,10 @@ ParamValues values_of_fit(const Model& model, const ParamValues& fixed) {
     if (p.kind == ParamKind::Choice) known.insert(*defaults.find(p.name));
   for (const std::string& name : fit::roles_of(model, known).with(fit::Role::Open))
     if (name != info.properties.fit_axis) known.insert(*defaults.find(name));
+  // A number that scales curves says nothing of the light if the curves are not those of the fit.
+  if (!info.properties.albedo_table)
+    for (const ParamInfo& p : info.params)
+      if (p.kind == ParamKind::Number) known.insert(*defaults.find(p.name));
   for (const auto& [name, value] : fixed) known.erase(name);
   return known;
 }

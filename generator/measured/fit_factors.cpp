@@ -25,8 +25,8 @@ constexpr int kFewSteps = 12, kSteps = 60;  ///< of the search for heights
 constexpr double kRange = 34, kSharedRange = 12;
 /// Of the deviations, the least that counts in the weights, in units of the mean of the data.
 constexpr double kFirstFloor = 0.3, kLastFloor = 3e-3;
-/// How far the slope of a curve's logarithm may change from piece to piece where the data say nothing.
-constexpr double kStiffness = 1e-4;
+/// Where the data say nothing, curves go on straight in the logarithm, and become flat.
+constexpr double kStiffness = 1e-4, kFlatness = 1e-6;
 
 /// The highlight's powers and the rest of it, for pairs of directions and roughnesses.
 struct Powers {
@@ -63,13 +63,23 @@ class Curves {
   Index heights() const { return Index(roles_.colors.size() + roles_.numbers.size()); }
   Index own() const { return Index(roles_.colors.size()); }
 
-  /// Heights of 1 at most, the rest of them in the strength. `logs`: of the heights, a column for each channel.
+  /// Heights of 1 at most, the rest of them in the strength, and the colour in the second curve: a factor of one curve
+  /// and its inverse of the other leave f as it is. `logs`: of the heights, a column for each channel.
   ParamValues values(const std::vector<double>& roughness, MatrixXd logs, const Rgb<double>& matte) const {
     ParamValues out = values_;
     for (std::size_t i = 0; i < roughness.size(); ++i) out[roles_.roughness[i]->name] = roughness[i];
     out[roles_.matte->name] = std::array<double, 3>{matte.r, matte.g, matte.b};
+    const auto of_colors = curves();
+    const auto [first_row, first_end] = of_colors[0];
+    Index brightest;
+    logs.middleRows(first_row, first_end - first_row).rowwise().mean().maxCoeff(&brightest);
+    for (Index c = 0; c < 3; ++c) {
+      const double shift = logs(first_row + brightest, c);
+      logs.col(c).segment(first_row, first_end - first_row).array() -= shift;
+      logs.col(c).segment(of_colors[1].first, of_colors[1].second - of_colors[1].first).array() += shift;
+    }
     double strength = 0;
-    for (const auto& [first, end] : curves()) {
+    for (const auto& [first, end] : of_colors) {
       const double highest = logs.middleRows(first, end - first).maxCoeff();
       logs.middleRows(first, end - first).array() -= highest;
       strength += highest;
@@ -82,6 +92,28 @@ class Curves {
     }
     for (const ParamInfo* p : roles_.numbers) out[p->name] = std::exp(logs(row++, 0));
     out[roles_.strength->name] = std::exp(strength);
+    return out;
+  }
+
+  /// No highlight, and the median of the light as matte light.
+  ParamValues matte_alone(const Pairs& pairs) const {
+    ParamValues out = values_;
+    out[roles_.strength->name] = 0.;
+    std::array<double, 3>& rho = std::get<std::array<double, 3>>(out[roles_.matte->name]);
+    for (std::size_t c = 0; c < 3; ++c) {
+      std::vector<std::pair<double, double>> sorted;  // value, weight
+      double half = 0;
+      for (std::size_t k = 0; k < pairs.data.size(); ++k) {
+        sorted.emplace_back(channel(pairs.data[k], c), pairs.weight[Index(k)]);
+        half += pairs.weight[Index(k)] / 2;
+      }
+      std::ranges::sort(sorted);
+      for (const auto& [value, weight] : sorted)
+        if ((half -= weight) <= 0) {
+          rho[c] = std::min(kPi * value, 1.);
+          break;
+        }
+    }
     return out;
   }
 
@@ -176,8 +208,13 @@ class Heights {
     return off / pairs_.light;
   }
 
-  /// Where curves bend: the change of slope at a knot, for each curve of each channel.
-  void add_stiffness(MatrixXd& a, VectorXd& b, const VectorXd& x, double strength) const {
+  /// Where curves bend, the change of slope at a knot, and where they are not flat: for each curve of each channel.
+  void add_stiffness(MatrixXd& a, VectorXd& b, const VectorXd& x, double strength, double flatness) const {
+    const auto rise = [&](Index i, Index j) {
+      const double r = flatness * (x[j] - x[i]);
+      b[i] += r, b[j] -= r;
+      a(i, i) += flatness, a(j, j) += flatness, a(i, j) -= flatness, a(j, i) -= flatness;
+    };
     const auto bend = [&](Index i, Index j, Index k) {
       const double r = x[i] - 2 * x[j] + x[k];
       const std::array<std::pair<Index, double>, 3> d{{{i, 1}, {j, -2}, {k, 1}}};
@@ -188,7 +225,10 @@ class Heights {
     };
     for (const auto& [first, end] : curves_.curves())
       for (Index c = 0; c < 3; ++c)
-        for (Index j = first + 1; j + 1 < end; ++j) bend(place(j - 1, c), place(j, c), place(j + 1, c));
+        for (Index j = first + 1; j < end; ++j) {
+          rise(place(j - 1, c), place(j, c));
+          if (j + 1 < end) bend(place(j - 1, c), place(j, c), place(j + 1, c));
+        }
   }
 
   void keep_in_range(VectorXd& x) const {
@@ -224,7 +264,7 @@ class Heights {
         }
       }
     }
-    add_stiffness(a, b, x, 1e-3);
+    add_stiffness(a, b, x, 1e-3, 0);
     for (Index i = 0; i < x.size(); ++i) a(i, i) += 1e-6;
     const VectorXd found = a.ldlt().solve(b);
     for (Index i = 0; i < x.size(); ++i)
@@ -253,7 +293,7 @@ class Heights {
             for (const auto& [j, v] : slope) a(i, j) += w * u * v;
           }
         }
-      add_stiffness(a, b, x, kStiffness);
+      add_stiffness(a, b, x, kStiffness, kFlatness);
       bool better = false;
       for (int tries = 0; tries < 6 && !better; ++tries) {
         MatrixXd damped = a;
@@ -305,6 +345,13 @@ ModelFit fit_factors(const Model& model, const CurveRoles& roles, bool isotropic
                      const Pairs& fine, const Pairs& last) {
   const auto start = std::chrono::steady_clock::now();
   const Curves curves(model, roles);
+  ModelFit out;
+  out.model = &model;
+  out.found = int(roles.colors.size() + roles.numbers.size()) + 2 + (isotropic ? 1 : 2);
+  if (!(fine.light > 0 && last.light > 0)) {
+    out.values = curves.matte_alone(last);
+    return out;
+  }
   const auto roughness = [&](const std::vector<double>& t) {
     std::vector<double> out;
     for (std::size_t i = 0; i < roles.roughness.size(); ++i)
@@ -338,14 +385,17 @@ ModelFit fit_factors(const Model& model, const CurveRoles& roles, bool isotropic
   const std::vector<double> best = roughness(std::ranges::min_element(tries, {}, &Try::error)->t);
   Heights heights(curves, best, fine);
   heights.solve(kSteps);
-  ModelFit out;
-  out.model = &model;
+  const auto found = [&](const ParamValues& values) {
+    const auto brdf = model.make_double(values);
+    Colors f(last.wi.size());
+    for (std::size_t k = 0; k < f.size(); ++k) f[k] = brdf->eval(last.wi[k], last.wo[k]);
+    return error_of(last, f);
+  };
   out.values = curves.values(best, heights.logs(), heights.matte());
-  const auto brdf = model.make_double(out.values);
-  Colors f(last.wi.size());
-  for (std::size_t k = 0; k < f.size(); ++k) f[k] = brdf->eval(last.wi[k], last.wo[k]);
-  out.error = error_of(last, f);
-  out.found = int(roles.colors.size() + roles.numbers.size()) + 2 + (isotropic ? 1 : 2);
+  out.error = found(out.values);
+  // A peak between the directions of a table may be met by none of the pairs that the curves were found with.
+  const ParamValues matte = curves.matte_alone(last);
+  if (const double error = found(matte); !(out.error < error)) out.values = matte, out.error = error;
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return out;
 }

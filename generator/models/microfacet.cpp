@@ -60,8 +60,12 @@ template <class T> struct Microfacet {
     v(f0, ColorSpec{"f0", "Normal Reflectance", {0.9, 0.6, 0.3}, "Reflectance of a facet seen from above"}.as(
               Optical::Reflectance));
     v(tint, ColorSpec{"tint", "Edge Tint", {1, 1, 1}, "Factor of the reflectance of facets seen at 82 degrees"});
-    v(ax, NumberSpec{"ax", "Roughness X", 0.3, 1e-4, 1, 0.02, 1, "Roughness along the tangent, alpha_x"}.by_factors());
-    v(ay, NumberSpec{"ay", "Roughness Y", 0.3, 1e-4, 1, 0.02, 1, "Roughness across the tangent, alpha_y"}.by_factors());
+    v(ax, NumberSpec{"ax", "Roughness X", 0.3, 1e-4, 1, 0.02, 1,
+                     "alpha along the tangent: the square of the Roughness of Blender's nodes"}
+              .by_factors());
+    v(ay, NumberSpec{"ay", "Roughness Y", 0.3, 1e-4, 1, 0.02, 1,
+                     "alpha across the tangent: the square of the Roughness of Blender's nodes"}
+              .by_factors());
     v(distribution, ChoiceSpec{"distribution",
                                "Distribution",
                                {"ggx", "beckmann"},

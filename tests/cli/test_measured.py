@@ -286,6 +286,16 @@ def test_headers_are_read_as_programs_write_them(tmp_path):
     assert done.returncode == 2 and "line 1: expected one column r, found several" in done.stderr
 
 
+def test_every_model_is_fitted_to_black_data(tmp_path):
+    file = tmp_path / "black.csv"
+    axes = grid(range(0, 91, 15), [0], range(0, 91, 15), range(0, 181, 15))
+    file.write_text(angle_table(*axes, *(0 * axes[0],) * 3), encoding="utf-8")
+    done = run("measured", file, "--json", "--models", "lambert,factors,microfacet")
+    assert done.returncode == 0, done.stderr
+    fits = {fit["model"]: fit for fit in json.loads(done.stdout)["fits"]}
+    assert fits["factors"]["error"] == 0 and fits["lambert"]["error"] == 0
+
+
 def test_radians_are_named_or_refused(tmp_path):
     file = tmp_path / "m.csv"
     axes = grid(range(0, 91, 15), [0], range(0, 91, 15), range(0, 181, 15))

@@ -115,5 +115,40 @@ TEST(FitFactors, AMatteSurfaceHasNoHighlight) {
   EXPECT_LT(fit.error, 0.002);
 }
 
+TEST(FitFactors, BlackDataAreBlack) {
+  const ModelFit fit = fitted(std::make_shared<OfModels>(std::vector<Part>{{"lambert", {"rho=0"}}}));
+  EXPECT_EQ(fit.error, 0);
+  const auto brdf = find_model("factors").make_double(fit.values);
+  EXPECT_LT(brdf->eval({0, 0, 1}, {0.6, 0, 0.8}).g, 1e-25) << "a logarithm of 0 has a bound";
+}
+
+// Curves that are found with few pairs may be anything between these.
+TEST(FitFactors, NoPeakIsFurtherOffThanAMatteSurface) {
+  for (const double alpha : {3e-4, 0.003, 0.01, 0.04}) {
+    const auto data = std::make_shared<Ggx>(alpha);
+    Measurement m;
+    m.file = "made";
+    m.isotropic = true;
+    m.table = data;
+    const auto matte = fit_models(m, MeasuredModel(m), {&find_model("lambert")}, Matte::None);
+    EXPECT_LT(fitted(data).error, matte.front().error * 1.05) << alpha;
+  }
+}
+
+TEST(FitFactors, TheColourIsInTheFresnelTerm) {
+  const ModelFit fit = fitted(std::make_shared<OfModels>(
+      std::vector<Part>{{"cook_torrance", {"m=0.3", "f0=0.9,0.6,0.2"}}, {"lambert", {"rho=0.05"}}}));
+  const auto color = [&](const char* name) { return std::get<std::array<double, 3>>(fit.values.at(name)); };
+  double highest = 0;
+  for (int k = 0; k < 14; ++k) highest = std::max(highest, color(("d" + std::to_string(k)).c_str())[1]);
+  for (int k = 0; k < 14; ++k) {
+    const auto d = color(("d" + std::to_string(k)).c_str());
+    if (d[1] == highest) {
+      EXPECT_NEAR(d[0], d[2], 1e-9) << k;
+    }
+  }
+  EXPECT_GT(color("f0")[0], 2 * color("f0")[2]);
+}
+
 }  // namespace
 }  // namespace brdfc::measured
