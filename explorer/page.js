@@ -266,6 +266,12 @@ function sliceAngles(full) {
   return [...angles].sort((a, b) => a - b);
 }
 
+/** A number with so many digits, and a power of ten where it is very large or small. */
+function digits(x, count) {
+  const written = Number(x.toPrecision(count));
+  return Math.abs(written) >= 1e6 ? written.toExponential() : String(written);
+}
+
 let shownCurves = [];
 function drawSlice() {
   const full = state.slots.some((s) => formulasOf(s).through);
@@ -314,8 +320,8 @@ function readSlice(event) {
       : first + ((x - 52) / (width - 64)) * -2 * first;
   if (Math.abs(angle) > -first) return;
   const near = (points) => points.reduce((a, b) => (Math.abs(b[0] - angle) < Math.abs(a[0] - angle) ? b : a));
-  const values = shownCurves.map((c) => `${c.label} ${Number(near(c.points)[1].toPrecision(4))}`);
-  byId("slice-note").textContent = `${angle.toFixed(1)}°: ${values.join(", ")}`;
+  const values = shownCurves.map((c) => `${c.label} ${digits(near(c.points)[1], 4)}`);
+  byId("slice-note").textContent = `${digits(near(shownCurves[0].points)[0], 4)}°: ${values.join(", ")}`;
 }
 
 function drawAlbedo() {
@@ -325,7 +331,7 @@ function drawAlbedo() {
     const points = Array.from({ length: ALBEDO_ANGLES }, (_, i) => [(90 * i) / (ALBEDO_ANGLES - 1), channelOf(values, i)]);
     const i = Math.min(ALBEDO_ANGLES - 2, Math.floor((state.theta / 90) * (ALBEDO_ANGLES - 1)));
     const t = (state.theta / 90) * (ALBEDO_ANGLES - 1) - i;
-    at.push(`${slotLabel(k)} ${((1 - t) * points[i][1] + t * points[i + 1][1]).toFixed(3)}`);
+    at.push(`${slotLabel(k)} ${digits((1 - t) * points[i][1] + t * points[i + 1][1], 2)}`);
     return { label: slotLabel(k), color: slotColor(k), points };
   });
   drawGraph(byId("albedo"), curves, { first: 0, last: 90, limit: 1, label: "angle of the view from the normal", height: 260, marks: [{ angle: state.theta }] });
@@ -436,9 +442,12 @@ function recipes(slot) {
   const named = set
     .map(([p, v]) => `, ${p.name}=${p.kind === "color" ? `(${v.map(written).join(", ")})` : p.kind === "choice" ? `"${v}"` : v}`)
     .join("");
+  // The pair of directions that the slice has its mirror direction at.
+  const phi = radians(state.azimuth), theta = radians(state.theta);
+  const [wi, wo] = [direction(-theta, phi), direction(theta, phi)].map((w) => w.map((x) => Number(x.toFixed(9))));
   return [
-    ["Command", `brdfc eval ${slot.model}${plain} < directions.csv`],
-    ["Python", `import brdfc\nbrdfc.model("${slot.model}").eval(wi, wo${named})`],
+    ["Command", `printf 'wi_x,wi_y,wi_z,wo_x,wo_y,wo_z\\n${[...wi, ...wo].join(",")}\\n' | brdfc eval ${slot.model}${plain}`],
+    ["Python", `import brdfc\nwi, wo = [${wi.join(", ")}], [${wo.join(", ")}]\nprint(brdfc.model("${slot.model}").eval(wi, wo${named}))`],
     ["Blender", `from bl_ext.user_default.brdfc_shaders import api\napi.new_material("${slot.model}"${named})`],
   ];
 }

@@ -164,7 +164,7 @@ def main():
     made = dict(row.split(",") for row in rows)
     with tempfile.TemporaryDirectory() as resources:
         bpy, loader = render_scene.start_blender(options.extension, Path(resources))
-        package = loader.__package__
+        package = loader.package
         library = importlib.import_module(f"{package}.library")
         api = importlib.import_module(f"{package}.api")
         entries = library.entries()

@@ -10,6 +10,7 @@ import io
 import itertools
 import json
 import re
+import shlex
 import shutil
 import subprocess
 
@@ -321,9 +322,17 @@ def test_a_link_carries_the_settings(found):
     assert sorted(re.split("[&,]", given[1:])) == sorted(re.split("[&,]", written[1:]))
     assert len(found["wrong"]) == 4
     command, python, blender = found["recipes"]
-    assert command == "brdfc eval ward ks=0.1,0.2,0.3 ax=0.3 normalisation=duer < directions.csv"
-    for text in (python, blender):
+    assert command.endswith(" | brdfc eval ward ks=0.1,0.2,0.3 ax=0.3 normalisation=duer")
+    for text in (python.removesuffix(")"), blender):
         assert text.endswith('ks=(0.1, 0.2, 0.3), ax=0.3, normalisation="duer")')
+
+
+def test_a_copied_command_runs(found):
+    command = found["recipes"][0].replace("brdfc eval", f"{shlex.quote(str(TOOL))} eval")
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    (row,) = csv.reader(io.StringIO(done.stdout.split("\n", 1)[1]))
+    assert all(float(x) > 0 for x in row[:3])
 
 
 def test_a_folder_of_others_stays(tmp_path):
