@@ -15,6 +15,7 @@ import re
 import numpy as np
 
 from ..brdfc import _closures
+from ..brdfc._formula import NUMPY
 
 
 class Unreadable(ValueError):
@@ -258,16 +259,16 @@ def facets(wi, wo, kind, normal, tangent, along, across, *_):
     if not np.any(tangent):
         tangent = np.moveaxis(np.eye(3)[np.argmin(np.abs(normal), axis=0)], -1, 0)
     of_kind = {"ggx": _closures.ggx, "beckmann": _closures.beckmann}[kind]
-    return of_kind(*wi, *wo, *normal, *tangent, along, across)
+    return of_kind(NUMPY, *wi, *wo, *normal, *tangent, along, across)
 
 
 #: Closures: f cos(theta_i) by directions and arguments, each with the components first.
 _CLOSURES = {
-    "diffuse": lambda wi, wo, n: _closures.diffuse(*wi, *wo, *n),
-    "diffuse_ramp": lambda wi, wo, n, ramp: _closures.diffuse_ramp(*wi, *wo, *n, *ramp),
-    "phong_ramp": lambda wi, wo, n, e, ramp: _closures.phong_ramp(*wi, *wo, *n, e, *ramp),
+    "diffuse": lambda wi, wo, n: _closures.diffuse(NUMPY, *wi, *wo, *n),
+    "diffuse_ramp": lambda wi, wo, n, ramp: _closures.diffuse_ramp(NUMPY, *wi, *wo, *n, *ramp),
+    "phong_ramp": lambda wi, wo, n, e, ramp: _closures.phong_ramp(NUMPY, *wi, *wo, *n, e, *ramp),
     "glossy_toon": lambda wi, wo, n, size, smooth: _closures.glossy_toon(
-        *wi, *wo, *n, size, smooth
+        NUMPY, *wi, *wo, *n, size, smooth
     ),
     "microfacet": facets,
     # Ideal mirror reflection is evaluated by ideal().

@@ -145,7 +145,7 @@ std::string module_of(const Model& model) {
   }
   const std::string text = functions.print(), name = class_name(info.name);
   std::string out = kHead + print::python_docstring({info.label + ". " + info.doc}, 0);
-  out += "\nimport numpy as np\n\nfrom .._formula import lookup, rgb, table\n";
+  out += "\nfrom .._formula import table\n";
   out += "from .._model import Choice, Color, Formulas, Model, Number\n" + text;
   out += fmt::format("\n\nclass {}(Model):\n    {}\n", name,
                      print::python_docstring({info.label + ". " + info.doc, info.paper, info.equations, list}, 4));
@@ -241,8 +241,7 @@ std::map<std::string, std::string> python_package(const std::vector<const Model*
 void require_package(const fs::path& folder) { require_replaceable(folder, "_version.py", kMadeBy); }
 
 std::string closures_module() {
-  std::string out =
-      kHead + "\"\"\"What closures of Cycles scatter.\"\"\"\n\nimport numpy as np\n\n" + "from ._formula import rgb\n";
+  std::string out = kHead + "\"\"\"What closures of Cycles scatter.\"\"\"\n";
   for (const auto& [kind, name] :
        {std::pair{ClosureKind::Diffuse, "diffuse"}, std::pair{ClosureKind::DiffuseRamp, "diffuse_ramp"},
         std::pair{ClosureKind::PhongRamp, "phong_ramp"}, std::pair{ClosureKind::Ggx, "ggx"},

@@ -13,7 +13,7 @@ bool is_python_word(const std::string& name) {
       "False",    "None",   "True", "and",    "as",    "assert", "async", "await",    "break",  "class",
       "continue", "def",    "del",  "elif",   "else",  "except", "for",   "from",     "global", "if",
       "in",       "import", "is",   "lambda", "not",   "or",     "pass",  "nonlocal", "raise",  "return",
-      "try",      "while",  "with", "yield",  "match", "case",   "np",    "rgb",      "lookup", "range"};
+      "try",      "while",  "with", "yield",  "match", "case",   "np",    "range"};
   return words.count(name) > 0 || name.starts_with("table_");
 }
 
@@ -72,7 +72,7 @@ class NumpyPrinter : public ProgramPrinter {
       case Op::Select:
         return "np.where";
       case Op::MakeColor:
-        return "rgb";
+        return "np.rgb";
       default:
         throw ExprError(std::string("no NumPy for ") + name_of(op));
     }
@@ -84,7 +84,7 @@ class NumpyPrinter : public ProgramPrinter {
       case Op::Const:
         if (n.type == ExprType::Bool) return {n.value[0] != 0 ? "True" : "False", 6};
         if (n.type == ExprType::Color)
-          return {fmt::format("rgb({}, {}, {})", python_number(n.value[0]), python_number(n.value[1]),
+          return {fmt::format("np.rgb({}, {}, {})", python_number(n.value[0]), python_number(n.value[1]),
                               python_number(n.value[2])),
                   6};
         return {python_number(n.value[0]), std::signbit(n.value[0]) ? 5 : 6};
@@ -112,7 +112,7 @@ class NumpyPrinter : public ProgramPrinter {
       case Op::MaxComponent:
         return {fmt::format("np.max({}, axis=0)", use(n.args[0], 0)), 6};
       case Op::Lookup: {
-        std::string s = fmt::format("lookup(table_{}", n.name);
+        std::string s = fmt::format("np.lookup(table_{}", n.name);
         for (int a : n.args) s += ", " + use(a, 0);
         return {s + ")", 6};
       }
@@ -208,10 +208,10 @@ std::string numpy_table(const Table& table) {
 std::string numpy_function(const Program& program, const std::string& name, const std::vector<std::string>& arguments,
                            Tables& tables) {
   add_tables(program, tables);
-  std::string out = fmt::format("def {}(", name);
+  std::string out = fmt::format("def {}(np", name);
   for (const std::string& a : arguments) {
     if (is_python_word(a)) throw ExprError("Python can't have an argument named " + a);
-    out += a + (&a == &arguments.back() ? "" : ", ");
+    out += ", " + a;
   }
   out += "):\n";
   NumpyPrinter printer(program, arguments);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A recorded program as Python on NumPy arrays, in double precision.
+// A recorded program as Python on arrays, of NumPy or of a library like it.
 //
-// A real is an array of shape (N,), a colour (3, N). Constants are (), (1,) or (3, 1); NumPy broadcasts these shapes.
+// A real is an array of shape (N,), a colour (3, N). Constants are (), (1,) or (3, 1), which broadcast.
 #pragma once
 
 #include <string>
@@ -16,9 +16,9 @@ namespace brdfc::print {
 bool is_python_word(const std::string& name);
 
 /// The source of a function with these arguments that returns the outputs in order; a single output is returned without
-/// a tuple. It calls np, rgb(r, g, b) and lookup(table, coordinates...), and refers to its tables as table_NAME. These
-/// tables are added to `tables`. Throws ExprError for an argument that is no valid name in Python, and if two tables
-/// have the same name.
+/// a tuple. Its first argument, np, has what it calls: NumPy's functions by their names, np.rgb(r, g, b) and
+/// np.lookup(table, coordinates...). It refers to its tables as table_NAME, which are added to `tables`. Throws
+/// ExprError for an argument that is no valid name in Python, and if two tables have the same name.
 std::string numpy_function(const Program&, const std::string& name, const std::vector<std::string>& arguments,
                            Tables& tables);
 

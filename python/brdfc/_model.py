@@ -6,10 +6,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from numbers import Integral
-from typing import Any, ClassVar, NamedTuple
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from ._formula import NUMPY
+
+if TYPE_CHECKING:
+    from ._arrays import ArrayModel
 
 #: Points that a formula takes at a time: what it holds between two steps then stays in the cache.
 BLOCK = 8192
@@ -84,7 +90,8 @@ class Sample(NamedTuple):
 
 
 class Formulas(NamedTuple):
-    """Functions of components of directions and of parameters; None for a term that is not."""
+    """Functions of a library's functions, of components of directions and of parameters; None for a
+    term that is not."""
 
     eval: Callable[..., Any] | None
     pdf: Callable[..., Any] | None
@@ -172,10 +179,7 @@ class Model:
         cos_theta_o: cosine (...) between view and normal in (0, 1], negative inside of a model of
         two sides; phi_o: azimuth (...) of the view in radians. Returns (..., 3).
         """
-        if not isinstance(samples, Integral) or isinstance(samples, bool):
-            raise TypeError(f"{self.name}: samples: expected a whole number, got {samples!r}")
-        if samples < 1:
-            raise ValueError(f"{self.name}: samples: expected a number from 1, got {samples}")
+        self._check_samples(samples)
         cosine = real(f"{self.name}: cos_theta_o", cos_theta_o, "numbers")
         phi = real(f"{self.name}: phi_o", phi_o, "numbers")
         if not np.all(np.isfinite(phi)):
@@ -200,12 +204,28 @@ class Model:
             axis=-2
         )
 
+    def on(self, namespace: ModuleType) -> ArrayModel:
+        """The model on arrays of another library: jax.numpy, torch, or one that follows the array
+        API standard. Functions of the result can be traced, compiled and differentiated."""
+        from ._arrays import ArrayModel
+
+        return ArrayModel(self, namespace)
+
     # ---- what the methods above share ----------------------------------------------------------
+
+    def _check_samples(self, samples: int) -> None:
+        if not isinstance(samples, Integral) or isinstance(samples, bool):
+            raise TypeError(f"{self.name}: samples: expected a whole number, got {samples!r}")
+        if samples < 1:
+            raise ValueError(f"{self.name}: samples: expected a number from 1, got {samples}")
+
+    def _check_vectors(self, name: str, shape: tuple[int, ...]) -> None:
+        if not shape or shape[-1] != 3:
+            raise ValueError(f"{self.name}: {name}: expected shape (..., 3), got {shape}")
 
     def _vectors(self, name: str, value: ArrayLike) -> Array:
         array = real(f"{self.name}: {name}", value, "numbers in an array (..., 3)")
-        if array.ndim == 0 or array.shape[-1] != 3:
-            raise ValueError(f"{self.name}: {name}: expected shape (..., 3), got {array.shape}")
+        self._check_vectors(name, array.shape)
         return array
 
     def _directions(self, name: str, value: ArrayLike) -> Array:
@@ -219,35 +239,39 @@ class Model:
             )
         return array / length[..., None]
 
-    def _bind(self, given: Mapping[str, ArrayLike]) -> tuple[tuple[str, ...], dict[str, Array]]:
-        """Choices, and numbers (...) and colours (..., 3) by name."""
+    def _choices(self, given: Mapping[str, ArrayLike]) -> tuple[str, ...]:
+        """The words of choices; that the model has what is given is checked as well."""
         for name in given:
             if name not in self.parameters:
                 raise TypeError(
                     f"{self.name}: unknown parameter {name!r}: expected one of "
                     f"{', '.join(self.parameters)}"
                 )
-        choices, values = [], {}
+        choices = []
         for name, p in self.parameters.items():
-            value = given.get(name, p.default)
             if isinstance(p, Choice):
+                value = given.get(name, p.default)
                 if not isinstance(value, str) or value not in p.choices:
                     raise ValueError(
                         f"{self.name}: {name}: expected one of {', '.join(p.choices)}, "
                         f"got {value!r}"
                     )
                 choices.append(value)
+        return tuple(choices)
+
+    def _bind(self, given: Mapping[str, ArrayLike]) -> tuple[tuple[str, ...], dict[str, Array]]:
+        """Choices, and numbers (...) and colours (..., 3) by name."""
+        choices, values = self._choices(given), {}
+        for name, p in self.parameters.items():
+            if isinstance(p, Choice):
                 continue
+            value = given.get(name, p.default)
             what = "three numbers or one" if isinstance(p, Color) else "a number"
             array = real(f"{self.name}: {name}", value, what)
             if isinstance(p, Color):
                 if array.ndim == 0:
                     array = np.repeat(array, 3)
-                if array.shape[-1] != 3:
-                    raise ValueError(
-                        f"{self.name}: {name}: expected {what}, or an array (..., 3), "
-                        f"got the shape {array.shape}"
-                    )
+                self._check_color(name, array.shape)
             inside = (array >= p.min) & (array <= p.max)  # false for NaN
             if not np.all(inside):
                 raise ValueError(
@@ -255,7 +279,29 @@ class Model:
                     f"{array[~inside].flat[0] if array.ndim else array}"
                 )
             values[name] = array
-        return tuple(choices), values
+        return choices, values
+
+    def _check_color(self, name: str, shape: tuple[int, ...]) -> None:
+        if shape[-1] != 3:
+            raise ValueError(
+                f"{self.name}: {name}: expected three numbers or one, or an array (..., 3), "
+                f"got the shape {shape}"
+            )
+
+    def _broadcast(
+        self, vectors: list[tuple[int, ...]], values: Mapping[str, tuple[int, ...]]
+    ) -> tuple[int, ...]:
+        """The shape that directions (..., 3), numbers (...) and colours (..., 3) of these shapes
+        broadcast to, without the 3."""
+        leads = [shape[:-1] for shape in vectors]
+        for name, shape in values.items():
+            leads.append(shape[:-1] if isinstance(self.parameters[name], Color) else shape)
+        try:
+            return np.broadcast_shapes(*leads)
+        except ValueError:
+            names = ["wi or wo"] * len(vectors) + list(values)
+            described = ", ".join(f"{n} {s}" for n, s in zip(names, leads, strict=True))
+            raise ValueError(f"{self.name}: shapes do not broadcast: {described}") from None
 
     def _run(
         self, what: str, vectors: list[Array], given: Mapping[str, ArrayLike], kinds: str
@@ -263,17 +309,9 @@ class Model:
         """The outputs of a formula, whose kinds are letters: r, a real, or c, a colour."""
         choices, values = self._bind(given)
         formula = getattr(self.formulas[choices], what)
-        leads = [v.shape[:-1] for v in vectors]
-        for name, value in values.items():
-            leads.append(
-                value.shape[:-1] if isinstance(self.parameters[name], Color) else value.shape
-            )
-        try:
-            shape = np.broadcast_shapes(*leads)
-        except ValueError:
-            names = ["wi or wo"] * len(vectors) + list(values)
-            described = ", ".join(f"{n} {s}" for n, s in zip(names, leads, strict=True))
-            raise ValueError(f"{self.name}: shapes do not broadcast: {described}") from None
+        shape = self._broadcast(
+            [v.shape for v in vectors], {name: value.shape for name, value in values.items()}
+        )
         size = int(np.prod(shape))
         out = [np.zeros((3, size) if k == "c" else size) for k in kinds]
         if formula is None:
@@ -297,10 +335,11 @@ class Model:
                 for first in range(0, size, BLOCK):
                     block = slice(first, first + BLOCK)
                     results = formula(
+                        NUMPY,
                         *(
                             a[..., block] if a.shape and a.shape[-1] == size else a
                             for a in arguments
-                        )
+                        ),
                     )
                     for array, result in zip(
                         out, results if len(out) > 1 else (results,), strict=True

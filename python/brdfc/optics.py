@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _optics
+from ._formula import NUMPY
 from ._model import real
 
 #: Metres after which absorption is exact where none are stated, and their range.
@@ -93,7 +94,7 @@ class Substance:
         """X, Y and Z of what is reflected, unpolarised, at an angle of that cosine in (0, 1]."""
         if not 0 < _one(f"{self.name}: cosine", cosine, "a number in (0, 1]") <= 1:
             raise ValueError(f"{self.name}: cosine: expected a number in (0, 1], got {cosine}")
-        return self._mean(lambda n, k: _optics.reflectance(cosine, n, k))
+        return self._mean(lambda n, k: _optics.reflectance(NUMPY, cosine, n, k))
 
     @property
     def absorbs(self) -> bool:
@@ -105,7 +106,7 @@ class Substance:
         if not 0 <= _one(f"{self.name}: metres", metres, "a number from 0") < math.inf:
             raise ValueError(f"{self.name}: metres: expected a number from 0, got {metres}")
         nm = _optics.WAVELENGTHS
-        left = _optics.transmittance(nm, self.k.at(nm), float(metres))
+        left = _optics.transmittance(NUMPY, nm, self.k.at(nm), float(metres))
         return np.broadcast_to(left, nm.shape) @ _optics.WEIGHTS
 
     def attenuation(self, to_rgb: ToRgb, metres: float = THICKNESS) -> Array:
@@ -138,9 +139,10 @@ class Substance:
     def values(self, to_rgb: ToRgb) -> Values:
         """What stands for it in three channels; see generator/model/optical.h."""
         xyz = self.xyz()
-        means = (xyz, *self._mean(_optics.normal_amplitude), self.xyz(_optics.GRAZING))
+        amplitude = self._mean(lambda n, k: _optics.normal_amplitude(NUMPY, n, k))
+        means = (xyz, *amplitude, self.xyz(_optics.GRAZING))
         rgb = [np.asarray(to_rgb(m), float) for m in means]
-        n, k = _optics.nearest_index(*rgb)
+        n, k = _optics.nearest_index(NUMPY, *rgb)
         return Values(n, k, np.clip(rgb[0], 0, 1), rgb[0], float(xyz[1]))
 
 

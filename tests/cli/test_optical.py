@@ -86,7 +86,7 @@ def test_a_substance_has_one_colour_in_every_working_space(tmp_path, optics, spa
         expected = np.array(s["xyz"]) * white
         in_space = converted(config, space, XYZ, s["reflectance"])
         np.testing.assert_allclose(in_space, expected, atol=1e-5, err_msg=s["name"])
-        of_index = optics._optics.reflectance(1.0, np.array(s["n"]), np.array(s["k"]))
+        of_index = optics._optics.reflectance(optics.NUMPY, 1.0, np.array(s["n"]), np.array(s["k"]))
         in_space = converted(config, space, XYZ, of_index)
         off = np.abs(in_space - expected).max()
         if s["name"] == "gold" and space == SPACES[0]:
@@ -193,7 +193,7 @@ def test_what_has_k_absorbs(tmp_path, optics):
             assert (s["absorption"] is not None) is package.absorbs is bool(package.k.nm)
     assert {n for n, s in found.items() if s.get("absorption")} == {"bk7", "f2", "sf11", "water"}
     water = optics.substance("water")
-    at_550 = optics._optics.transmittance(550.0, float(water.k.at(550.0)), 1.0)
+    at_550 = optics._optics.transmittance(optics.NUMPY, 550.0, float(water.k.at(550.0)), 1.0)
     assert -np.log(at_550) == pytest.approx(0.0448, abs=1e-4)
     red, green, blue = optical("water", "--thickness", 1)["absorption"]["transmittance"]
     assert 0.7 < red < 0.76 and 0.95 < green < blue < 0.98

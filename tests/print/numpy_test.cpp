@@ -21,7 +21,8 @@ std::string function_of(const Expr& value, const std::vector<std::string>& argum
 
 TEST(NumPy, ConstantsKeepTheDigitsOfADouble) {
   Recorder recorder(Precision::Double);
-  EXPECT_EQ(function_of(Expr::input("x") * sqrt(Expr(2.0)), {"x"}), "def f(x):\n    return x * 1.4142135623730951\n");
+  EXPECT_EQ(function_of(Expr::input("x") * sqrt(Expr(2.0)), {"x"}),
+            "def f(np, x):\n    return x * 1.4142135623730951\n");
 }
 
 TEST(NumPy, GroupingSurvives) {
@@ -43,7 +44,7 @@ TEST(NumPy, AnIterationStaysALoopOfTheStepsOfItsPrecision) {
                        {"x"});
   };
   EXPECT_EQ(text(Precision::Double),
-            "def f(x):\n    x0 = x\n    for i in range(24):\n        next0 = x0 - (x0 * x0 - x) / (x0 + x0)\n"
+            "def f(np, x):\n    x0 = x\n    for i in range(24):\n        next0 = x0 - (x0 * x0 - x) / (x0 + x0)\n"
             "        x0 = next0\n    return x0\n");
   EXPECT_THAT(text(Precision::Single), HasSubstr("range(10)"));
 }
@@ -57,7 +58,7 @@ TEST(NumPy, ColoursAndTables) {
   program.output("m", lookup(table, std::array<Expr, 2>{x, max_component(Rgb<Expr>::input("k"))}));
   Tables tables;
   EXPECT_EQ(numpy_function(program, "f", {"x", "k"}, tables),
-            "def f(x, k):\n    return k * rgb(x, 0.5, 1.0), lookup(table_t, x, np.max(k, axis=0))\n");
+            "def f(np, x, k):\n    return k * np.rgb(x, 0.5, 1.0), np.lookup(table_t, x, np.max(k, axis=0))\n");
   EXPECT_EQ(tables.at("t"), table);
   EXPECT_EQ(numpy_table(*table), "table_t = table((2, 2), \"\"\"\n0 0.3333333333333333 2 1e-20\n\"\"\")\n");
   const auto other = make_table("t", {even_axis("x", 2)}, {0, 1});
@@ -70,7 +71,7 @@ TEST(NumPy, WordsOfPythonAreNoNames) {
   const Expr x = Expr::input("x");
   const Expr lambda = named("lambda", x * x), np = named("np", exp(lambda)), table = named("table_t", np + lambda);
   EXPECT_EQ(function_of(table * np, {"x"}),
-            "def f(x):\n    lambda_1 = x * x\n    np_1 = np.exp(lambda_1)\n    model_table_t = np_1 + lambda_1\n"
+            "def f(np, x):\n    lambda_1 = x * x\n    np_1 = np.exp(lambda_1)\n    model_table_t = np_1 + lambda_1\n"
             "    return model_table_t * np_1\n");
   EXPECT_THROW(function_of(x, {"x", "lambda"}), ExprError);
 }

@@ -7,7 +7,10 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-SOURCES = (ROOT / "python/brdfc/_model.py", ROOT / "blender_addon/api.py")
+SOURCES = [
+    ROOT / path
+    for path in ("python/brdfc/_model.py", "python/brdfc/_arrays.py", "blender_addon/api.py")
+]
 
 
 def test_arguments_beside_parameters_are_reserved():
