@@ -195,7 +195,7 @@ def test_shaders_are_short(extension_zip, subtests):
     """Every shader of the extension has fewer than 600 statements, counted by the generator as
     operations and here in its text. Aimed forms contain a base and the computations for lamps in
     addition to a model's value and sampling: up to 1,400 statements, which compile in about 0.4 s;
-    `lossless`, whose value is a long sum, has 2,900, and `factors`, with three curves, 2,300, or 900
+    `lossless`, whose value is a long sum, has 2,900; `factors`, with three curves, has 2,300, or 900
     without a base and lamps."""
     import zipfile
 
