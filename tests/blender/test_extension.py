@@ -195,8 +195,8 @@ def test_shaders_are_short(extension_zip, subtests):
     """Every shader of the extension has fewer than 600 statements, counted by the generator as
     operations and here in its text. Aimed forms contain a base and the computations for lamps in
     addition to a model's value and sampling: up to 1,400 statements, which compile in about 0.4 s;
-    `lossless`, whose value is a long sum, has 2,900; `factors`, with three curves, has 2,300, or 900
-    without a base and lamps."""
+    `lossless`, whose value is a long sum, has 2,900; `factors`, with three curves, has 2,300, and
+    900 without a base and lamps."""
     import zipfile
 
     text = "shader x(float a = 0 [[ int b = 1; ]],\n    output color Albedo = 0)\n{\n"
