@@ -3,33 +3,10 @@
 #include <gtest/gtest.h>
 
 #include "measured/fit_factors.h"
+#include "measured/sum_table.h"
 
 namespace brdfc::measured {
 namespace {
-
-struct Part {
-  const char* model;
-  std::vector<std::string> values;
-};
-
-/// A table that is a sum of models of this project.
-class OfModels final : public Table {
- public:
-  explicit OfModels(const std::vector<Part>& parts) {
-    for (const Part& p : parts) {
-      const Model& model = find_model(p.model);
-      terms_.push_back(model.make_double(complete(model.info(), parse_values(model.info(), p.values))));
-    }
-  }
-  Rgb<double> eval(const Vec3<double>& wi, const Vec3<double>& wo) const override {
-    Rgb<double> f(0);
-    for (const auto& term : terms_) f += term->eval(wi, wo);
-    return f;
-  }
-
- private:
-  std::vector<std::unique_ptr<Brdf<double>>> terms_;
-};
 
 /// B. Walter, S. Marschner, H. Li, K. Torrance: Microfacet Models for Refraction through Rough Surfaces, EGSR 2007,
 /// with height-correlated shadowing and Schlick's Fresnel term, over a matte surface.
@@ -79,7 +56,7 @@ TEST(FitFactors, ColouredCurvesAreFound) {
   const Part made{"factors",
                   {"rho=0.1,0.2,0.05", "ax=0.13", "ay=0.13", "strength=0.7", "d1=0.9,0.8,0.6", "d3=0.6,0.5,0.3",
                    "d5=0.5,0.2,0.2", "d7=0.3,0.1,0.1", "f0=0.3,0.2,0.1", "f3=0.35,0.25,0.15", "g3=0.6"}};
-  EXPECT_LT(fitted(std::make_shared<OfModels>(std::vector{made})).error, 0.01);
+  EXPECT_LT(fitted(std::make_shared<SumTable>(std::vector{made})).error, 0.01);
 }
 
 TEST(FitFactors, TwoHighlightsOverAMatteSurface) {
@@ -90,7 +67,7 @@ TEST(FitFactors, TwoHighlightsOverAMatteSurface) {
   Measurement m;
   m.file = "made";
   m.isotropic = true;
-  m.table = std::make_shared<OfModels>(paint);
+  m.table = std::make_shared<SumTable>(paint);
   const auto formulas =
       fit_models(m, MeasuredModel(m), {&find_model("cook_torrance"), &find_model("ward")}, Matte::Added);
   const double error = fitted(m.table).error;
@@ -100,23 +77,23 @@ TEST(FitFactors, TwoHighlightsOverAMatteSurface) {
 
 TEST(FitFactors, BrushedMetal) {
   const std::vector<Part> metal{{"ward", {"ks=0.5,0.4,0.3", "ax=0.08", "ay=0.33"}}, {"lambert", {"rho=0.05"}}};
-  const ModelFit fit = fitted(std::make_shared<OfModels>(metal), false);
+  const ModelFit fit = fitted(std::make_shared<SumTable>(metal), false);
   EXPECT_LT(fit.error, 0.03);
   EXPECT_NEAR(std::get<double>(fit.values.at("ay")) / std::get<double>(fit.values.at("ax")), 0.33 / 0.08, 0.3);
 }
 
 TEST(FitFactors, WhatIsNoProductOfFactorsHasALargeError) {
   // Lobes about the mirror direction are far from it: the error says so.
-  EXPECT_GT(fitted(std::make_shared<OfModels>(std::vector<Part>{{"radziszewski_alda", {"n=4"}}})).error, 0.05);
+  EXPECT_GT(fitted(std::make_shared<SumTable>(std::vector<Part>{{"radziszewski_alda", {"n=4"}}})).error, 0.05);
 }
 
 TEST(FitFactors, AMatteSurfaceHasNoHighlight) {
-  const ModelFit fit = fitted(std::make_shared<OfModels>(std::vector<Part>{{"lambert", {"rho=0.5,0.3,0.2"}}}));
+  const ModelFit fit = fitted(std::make_shared<SumTable>(std::vector<Part>{{"lambert", {"rho=0.5,0.3,0.2"}}}));
   EXPECT_LT(fit.error, 0.002);
 }
 
 TEST(FitFactors, BlackDataAreBlack) {
-  const ModelFit fit = fitted(std::make_shared<OfModels>(std::vector<Part>{{"lambert", {"rho=0"}}}));
+  const ModelFit fit = fitted(std::make_shared<SumTable>(std::vector<Part>{{"lambert", {"rho=0"}}}));
   EXPECT_EQ(fit.error, 0);
   const auto brdf = find_model("factors").make_double(fit.values);
   EXPECT_LT(brdf->eval({0, 0, 1}, {0.6, 0, 0.8}).g, 1e-25) << "a logarithm of 0 has a bound";
@@ -136,7 +113,7 @@ TEST(FitFactors, NoPeakIsFurtherOffThanAMatteSurface) {
 }
 
 TEST(FitFactors, TheColourIsInTheFresnelTerm) {
-  const ModelFit fit = fitted(std::make_shared<OfModels>(
+  const ModelFit fit = fitted(std::make_shared<SumTable>(
       std::vector<Part>{{"cook_torrance", {"m=0.3", "f0=0.9,0.6,0.2"}}, {"lambert", {"rho=0.05"}}}));
   const auto color = [&](const char* name) { return std::get<std::array<double, 3>>(fit.values.at(name)); };
   double highest = 0;

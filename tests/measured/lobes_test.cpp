@@ -9,46 +9,17 @@
 #include "measure/probes.h"
 #include "measured/fit_lobes.h"
 #include "measured/least_deviations.h"
+#include "measured/sum_table.h"
 
 namespace brdfc::measured {
 namespace {
-
-struct Part {
-  const char* model;
-  std::vector<std::string> values;
-};
-
-std::vector<Lobe> lobes_of(const std::vector<Part>& parts) {
-  std::vector<Lobe> out;
-  for (const Part& p : parts) {
-    const Model& model = find_model(p.model);
-    out.push_back({&model, complete(model.info(), parse_values(model.info(), p.values))});
-  }
-  return out;
-}
-
-/// A table that is a sum of models of this project.
-class OfLobes final : public Table {
- public:
-  explicit OfLobes(const std::vector<Part>& parts) {
-    for (const Lobe& lobe : lobes_of(parts)) terms_.push_back(lobe.model->make_double(lobe.values));
-  }
-  Rgb<double> eval(const Vec3<double>& wi, const Vec3<double>& wo) const override {
-    Rgb<double> f(0);
-    for (const auto& term : terms_) f += term->eval(wi, wo);
-    return f;
-  }
-
- private:
-  std::vector<std::unique_ptr<Brdf<double>>> terms_;
-};
 
 std::vector<LobeSum> fitted(const std::vector<Part>& parts, std::size_t most, const std::vector<std::string>& from = {},
                             bool isotropic = true) {
   Measurement m;
   m.file = "made";
   m.isotropic = isotropic;
-  m.table = std::make_shared<OfLobes>(parts);
+  m.table = std::make_shared<SumTable>(parts);
   return fit_lobes(m, MeasuredModel(m), lobe_kinds(from, isotropic), most);
 }
 
@@ -114,7 +85,7 @@ TEST(FitLobes, KnownSumsAreFound) {
   }
 }
 
-TEST(FitLobes, TheErrorFallsWithTheNumberOfLobes) {
+TEST(FitLobes, TheErrorFallsWithTheNumberSumTable) {
   // None of the lobes is of the data's kind.
   const auto sums = fitted(kKnown[0].parts, 6, {"radziszewski_alda", "lambert"});
   ASSERT_GE(sums.size(), 3u);
@@ -144,7 +115,7 @@ double misplaced(const Table& data, const LobeSum& sum) {
 TEST(FitLobes, TheErrorIsTheLightThatIsMisplaced) {
   const auto sums = fitted(kKnown[1].parts, 3, {"blinn", "lambert"});
   for (const LobeSum& sum : sums)
-    EXPECT_NEAR(sum.error, misplaced(OfLobes(kKnown[1].parts), sum), 0.03 * sum.error + 1e-3);
+    EXPECT_NEAR(sum.error, misplaced(SumTable(kKnown[1].parts), sum), 0.03 * sum.error + 1e-3);
 }
 
 TEST(FitLobes, ARetroreflectorNeedsALobeOfItsKind) {
