@@ -3,6 +3,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -14,6 +15,10 @@ MODELS = [model["name"] for model in LISTED]
 #: The colour configuration of the tool, and its working spaces.
 CONFIG = ROOT / "data" / "color" / "config.ocio"
 SPACES = ("Linear Rec.709", "Linear Rec.2020", "ACEScg")
+
+#: A browser for tests of pages, or None.
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+CHROMIUM = next(filter(None, map(shutil.which, BROWSERS)), None)
 
 
 def run(*arguments, config=None):

@@ -11,16 +11,14 @@ import itertools
 import json
 import re
 import shlex
-import shutil
 import subprocess
 
 import numpy as np
 import pytest
-from support import LISTED, ROOT, TOOL
+from support import BROWSERS, CHROMIUM, LISTED, ROOT, TOOL
 
 pytestmark = pytest.mark.slow
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = (
     "--headless=new --no-sandbox --disable-dev-shm-usage --no-first-run --enable-logging=stderr "
     "--use-angle=swiftshader --enable-unsafe-swiftshader --dump-dom"
@@ -200,8 +198,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def found(folder, tmp_path_factory):
     """What the script at the page's end found."""
-    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if browser is None:
+    if CHROMIUM is None:
         pytest.skip(f"none of {', '.join(BROWSERS)} is installed: the explorer was not tested")
     given = {
         "CASES": [{"model": m, "values": values_of(m, text)} for m, text in CASES],
@@ -219,7 +216,7 @@ def found(folder, tmp_path_factory):
     (folder / "check.html").write_text(page, encoding="utf-8")
     profile = tmp_path_factory.mktemp("profile")
     address = (folder / "check.html").as_uri()
-    command = [browser, *FLAGS, f"--user-data-dir={profile}", address]
+    command = [CHROMIUM, *FLAGS, f"--user-data-dir={profile}", address]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     result = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.S)
     assert result, done.stderr[-2000:]

@@ -216,6 +216,12 @@ class Call(NamedTuple):
         return lambda *arguments: self(model, *arguments).sum()
 
 
+def functions(wi, wo, u):
+    """The arrays of vectors that each function of a model takes."""
+    both = [wi, wo]
+    return {"eval": both, "pdf": both, "sample": [wo, u], "mirror": [wo], "transmit": [wo]}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 def test_gradients_are_finite_differences(brdfc, differentiating, name):
@@ -232,13 +238,7 @@ def test_gradients_are_finite_differences(brdfc, differentiating, name):
     for choices in all_choices(model):
         for values in (inner_values(model), random_values(model, random)):
             wide = [np.broadcast_to(v, (len(wi), *v.shape)) + 0.0 for v in values.values()]
-            for what, vectors in [
-                ("eval", [wi, wo]),
-                ("pdf", [wi, wo]),
-                ("sample", [wo, u]),
-                ("mirror", [wo]),
-                ("transmit", [wo]),
-            ]:
+            for what, vectors in functions(wi, wo, u).items():
                 call = Call(what, len(vectors), list(values), choices)
 
                 point = [*vectors, *wide]
@@ -301,13 +301,7 @@ def test_gradients_are_numbers_everywhere(brdfc, differentiating, name, precisio
     wide = {n: np.asarray(p.default, float) for n, p in numeric(model).items()}
     wide = {n: np.broadcast_to(v, (len(wi), *v.shape)) for n, v in wide.items()}
     for choices in all_choices(model):
-        for what, vectors in [
-            ("eval", [wi, wo]),
-            ("pdf", [wi, wo]),
-            ("sample", [wo, u]),
-            ("mirror", [wo]),
-            ("transmit", [wo]),
-        ]:
+        for what, vectors in functions(wi, wo, u).items():
             call = Call(what, len(vectors), list(wide), choices)
             point = [
                 differentiating.xp.asarray(a.astype(precision)) for a in (*vectors, *wide.values())

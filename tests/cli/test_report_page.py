@@ -4,13 +4,11 @@ hovering over a picture shows the reference in its place."""
 
 import json
 import re
-import shutil
 import subprocess
 
 import pytest
-from support import TOOL, scene
+from support import CHROMIUM, TOOL, scene
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 WIDTH = 1280
 #: Appends the page's state after layout to it, as text.
 PROBE = """<script>
