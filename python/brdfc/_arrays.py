@@ -87,35 +87,12 @@ class Functions:
 
     # ---- elementwise ---------------------------------------------------------------------------
 
-    def abs(self, x):
-        return self.xp.abs(x)
+    def __getattr__(self, name: str):
+        """The functions that all libraries have alike: abs, cos, exp, ..."""
+        return getattr(self.xp, name)
 
     def arctan(self, x):
         return (getattr(self.xp, "atan", None) or self.xp.arctan)(x)
-
-    def cos(self, x):
-        return self.xp.cos(x)
-
-    def exp(self, x):
-        return self.xp.exp(x)
-
-    def expm1(self, x):
-        return self.xp.expm1(x)
-
-    def floor(self, x):
-        return self.xp.floor(x)
-
-    def log(self, x):
-        return self.xp.log(x)
-
-    def log1p(self, x):
-        return self.xp.log1p(x)
-
-    def logical_not(self, x):
-        return self.xp.logical_not(x)
-
-    def sin(self, x):
-        return self.xp.sin(x)
 
     def sqrt(self, x):
         return self._root(self.xp.sqrt, x, 0.0 < x)
