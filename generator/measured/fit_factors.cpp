@@ -8,6 +8,7 @@
 
 #include "core/parallel.h"
 #include "fit/view.h"
+#include "measured/least_deviations.h"
 
 namespace brdfc::measured {
 namespace {
@@ -95,24 +96,17 @@ class Curves {
     return out;
   }
 
-  /// No highlight, and the median of the light as matte light.
+  /// Matte light alone.
   ParamValues matte_alone(const Pairs& pairs) const {
     ParamValues out = values_;
     out[roles_.strength->name] = 0.;
     std::array<double, 3>& rho = std::get<std::array<double, 3>>(out[roles_.matte->name]);
+    const Index count = Index(pairs.data.size());
+    const MatrixXd column = MatrixXd::Constant(count, 1, 1 / kPi);
     for (std::size_t c = 0; c < 3; ++c) {
-      std::vector<std::pair<double, double>> sorted;  // value, weight
-      double half = 0;
-      for (std::size_t k = 0; k < pairs.data.size(); ++k) {
-        sorted.emplace_back(channel(pairs.data[k], c), pairs.weight[Index(k)]);
-        half += pairs.weight[Index(k)] / 2;
-      }
-      std::ranges::sort(sorted);
-      for (const auto& [value, weight] : sorted)
-        if ((half -= weight) <= 0) {
-          rho[c] = std::min(kPi * value, 1.);
-          break;
-        }
+      VectorXd target(count);
+      for (Index k = 0; k < count; ++k) target[k] = channel(pairs.data[std::size_t(k)], c);
+      rho[c] = least_deviations(column, target, pairs.weight, target.mean(), VectorXd::Ones(1))[0];
     }
     return out;
   }
