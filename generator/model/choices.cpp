@@ -20,6 +20,13 @@ std::vector<Choices> choice_combinations(const ModelInfo& info) {
   return all;
 }
 
+std::vector<std::string> options_of(const ModelInfo& info, const Choices& choices) {
+  std::vector<std::string> out;
+  for (const ParamInfo& p : info.params)
+    if (p.kind == ParamKind::Choice) out.push_back(p.choices[std::size_t(choices.at(out.size()))]);
+  return out;
+}
+
 ParamValues with_choices(const ModelInfo& info, const Choices& choices, ParamValues values) {
   std::size_t k = 0;
   for (const ParamInfo& p : info.params)

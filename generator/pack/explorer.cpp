@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "pack/explorer.h"
 
+#include <fmt/format.h>
 #include <openssl/evp.h>
 
 #include <bit>
@@ -106,14 +107,10 @@ Json described(const Model& model, print::Tables& tables) {
   for (const ParamInfo& p : info.params) parameters.push_back(parameter_json(p));
   Functions functions(model, tables);
   for (const Choices& choices : choice_combinations(info)) {
-    std::string key, suffix;
-    std::size_t k = 0;
-    for (const ParamInfo& p : info.params)
-      if (p.kind == ParamKind::Choice) {
-        const std::string& choice = p.choices[std::size_t(choices[k++])];
-        key += (key.empty() ? "" : " ") + choice;
-        suffix += "_" + choice;
-      }
+    const std::vector<std::string> options = options_of(info, choices);
+    const std::string key = fmt::format("{}", fmt::join(options, " "));
+    std::string suffix;
+    for (const std::string& option : options) suffix += "_" + option;
     formulas[key] = functions.add(choices, suffix);
     formulas[key]["through"] = model.has_through() && [&] {
       Recorder recorder;

@@ -85,11 +85,8 @@ class Functions {
 
   /// The functions for one combination of choices, as a constructor call.
   std::string add(const Choices& choices) {
-    const ModelInfo& info = model_.info();
     std::string suffix;
-    std::size_t k = 0;
-    for (const ParamInfo& p : info.params)
-      if (p.kind == ParamKind::Choice) suffix.append("_").append(p.choices[std::size_t(choices[k++])]);
+    for (const std::string& option : options_of(model_.info(), choices)) suffix += "_" + option;
     const RecordedModel recorded = record_model(model_, choices, Precision::Double);
     const std::array<std::string, 5> names = {
         function("eval", suffix, recorded.eval, {"wi", "wo"}), function("pdf", suffix, recorded.pdf, {"wi", "wo"}),
@@ -132,9 +129,7 @@ std::string module_of(const Model& model) {
   std::string formulas;
   for (const Choices& choices : choice_combinations(info)) {
     std::string key;
-    std::size_t k = 0;
-    for (const ParamInfo& p : info.params)
-      if (p.kind == ParamKind::Choice) key += python_string(p.choices[std::size_t(choices[k++])]) + ", ";
+    for (const std::string& option : options_of(info, choices)) key += python_string(option) + ", ";
     const std::string call = functions.add(choices);
     formulas += fmt::format("        ({}): {},\n", key, call);
   }
