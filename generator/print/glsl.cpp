@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 
+#include "print/c_like_printer.h"
 #include "print/osl_text.h"
 
 namespace brdfc::print {
@@ -40,58 +41,20 @@ constexpr const char* kWords = R"(
   textureProjLodOffset textureGrad textureGradOffset textureProjGrad textureProjGradOffset dFdx dFdy fwidth main
 )";
 
-/// GLSL's operations on floats as precise as the formulas need: a device may compute atan to 4096 units in the last
-/// place, and sin and cos to 5e-4.
-const char* library_name(Op op) {
-  switch (op) {
-    case Op::Cbrt:
-      return "brdfc_cbrt";
-    case Op::Exp:
-      return "brdfc_exp";
-    case Op::Log:
-      return "brdfc_log";
-    case Op::Log1p:
-      return "brdfc_log1p";
-    case Op::Expm1:
-      return "brdfc_expm1";
-    case Op::Sin:
-      return "brdfc_sin";
-    case Op::Cos:
-      return "brdfc_cos";
-    case Op::Atan:
-      return "brdfc_atan";
-    case Op::Pow:
-      return "brdfc_pow";
-    case Op::MaxComponent:
-      return "brdfc_max_component";
-    default:
-      throw ExprError(std::string("no GLSL for ") + name_of(op));
-  }
-}
-
 const char* type_name(ExprType t) { return t == ExprType::Color ? "vec3" : t == ExprType::Bool ? "bool" : "float"; }
 
 std::string variable(const std::string& name) { return is_glsl_word(name) ? name + "_" : name; }
 
-class GlslPrinter : public ProgramPrinter {
+class GlslPrinter : public CLikePrinter {
  public:
-  using ProgramPrinter::ProgramPrinter;
+  using CLikePrinter::CLikePrinter;
 
  private:
+  const char* type_name(ExprType t) const override { return print::type_name(t); }
   bool is_word(const std::string& name) const override { return is_glsl_word(name); }
   std::string free_base(const std::string& name) const override {
     return name.starts_with("brdfc_") || name.starts_with("table_") ? "model_" + name : name;
   }
-  std::string declaration(ExprType type, const std::string& name, const std::string& value) const override {
-    return fmt::format("{} {} = {};", type_name(type), name, value);
-  }
-  std::string assignment(const std::string& name, const std::string& value) const override {
-    return fmt::format("{} = {};", name, value);
-  }
-  std::string loop_head(const std::string& i, int count) const override {
-    return fmt::format("for (int {0} = 0; {0} < {1}; {0}++) {{", i, count);
-  }
-  std::string loop_end() const override { return "}"; }
 
   Text text(int id) const override {
     const ExprNode& n = program_.node(id);
@@ -103,38 +66,11 @@ class GlslPrinter : public ProgramPrinter {
         return {number(n.value[0]), std::signbit(n.value[0]) ? 5 : 6};
       case Op::Input:
         return {variable(n.name), 6};
-      case Op::Add:
-      case Op::Sub:
-        return infix(name_of(n.op), n, 3);
-      case Op::Mul:
-      case Op::Div:
-        return infix(name_of(n.op), n, 4);
-      case Op::Neg:
-        return {fmt::format("-{}", use(n.args[0], 6)), 5};
-      case Op::Sqrt:
-      case Op::Abs:
-      case Op::Min:
-      case Op::Max:
-        return call(name_of(n.op), n);
       case Op::MakeColor:
         return call("vec3", n);
-      case Op::Less:
-      case Op::LessEqual:
-        return infix(name_of(n.op), n, 2);
-      case Op::And:
-        return {use(n.args[0], 2) + " && " + use(n.args[1], 2), 1};
-      case Op::Or:
-        return {use(n.args[0], 2) + " || " + use(n.args[1], 2), 1};
-      case Op::Not:
-        return {fmt::format("!{}", use(n.args[0], 6)), 5};
-      case Op::Select: {
+      case Op::Select:
         // A function and not `?:`, with which devices branch to the arms: compilers then take up to minutes.
-        const auto arm = [&](std::size_t i) {
-          const bool promote = n.type == ExprType::Color && program_.node(n.args[i]).type != ExprType::Color;
-          return promote ? "vec3(" + use(n.args[i], 0) + ")" : use(n.args[i], 0);
-        };
-        return {fmt::format("brdfc_select({}, {}, {})", use(n.args[0], 0), arm(1), arm(2)), 6};
-      }
+        return {fmt::format("brdfc_select({}, {}, {})", use(n.args[0], 0), arm(n, 1, 0), arm(n, 2, 0)), 6};
       case Op::Lookup: {
         std::string sizes, coordinates;
         for (std::size_t i = 0; i < n.args.size(); ++i) {
@@ -143,10 +79,21 @@ class GlslPrinter : public ProgramPrinter {
         }
         return {fmt::format("brdfc_table{}(table_{}{}{})", n.args.size(), n.name, sizes, coordinates), 6};
       }
-      case Op::LoopOut:
-        return {loop_out(n), 6};
-      default:
+      // Of the library, as GLSL lacks them or computes few digits: a device may compute atan to 4096 units in the last
+      // place, and sin and cos to 5e-4.
+      case Op::Cbrt:
+      case Op::Exp:
+      case Op::Log:
+      case Op::Log1p:
+      case Op::Expm1:
+      case Op::Sin:
+      case Op::Cos:
+      case Op::Atan:
+      case Op::Pow:
+      case Op::MaxComponent:
         return call(library_name(n.op), n);
+      default:
+        return CLikePrinter::text(id);
     }
   }
 };

@@ -5,22 +5,21 @@
 
 #include <map>
 
+#include "print/c_like_printer.h"
 #include "print/osl_table.h"
 #include "print/osl_text.h"
 #include "print/osl_words.h"
-#include "print/program_printer.h"
 
 namespace brdfc::print {
 namespace {
 
 /// Operations that are functions of the library, because OSL lacks them.
 bool is_of_library(Op op) { return op == Op::Log1p || op == Op::Expm1 || op == Op::MaxComponent; }
-std::string library_name(Op op) { return std::string("brdfc_") + name_of(op); }
 
 /// Prints values in OSL's syntax, each with its precedence.
-class OslPrinter : public ProgramPrinter {
+class OslPrinter : public CLikePrinter {
  public:
-  using ProgramPrinter::ProgramPrinter;
+  using CLikePrinter::CLikePrinter;
 
   /// The arrays that look-ups read; must be called before the statements are printed.
   std::vector<ProgramArray> arrays() {
@@ -36,23 +35,11 @@ class OslPrinter : public ProgramPrinter {
   }
 
  private:
-  static const char* type_name(ExprType t) {
+  const char* type_name(ExprType t) const override {
     return t == ExprType::Color ? "color" : t == ExprType::Bool ? "int" : "float";
   }
-
   bool is_word(const std::string& name) const override { return is_osl_word(name); }
   std::string free_base(const std::string& name) const override { return unnumbered(name); }
-  std::string declaration(ExprType type, const std::string& name, const std::string& value) const override {
-    return fmt::format("{} {} = {};", type_name(type), name, value);
-  }
-  std::string assignment(const std::string& name, const std::string& value) const override {
-    return fmt::format("{} = {};", name, value);
-  }
-  std::string loop_head(const std::string& i, int count) const override {
-    return fmt::format("for (int {0} = 0; {0} < {1}; {0}++) {{", i, count);
-  }
-  std::string loop_end() const override { return "}"; }
-
   Text text(int id) const override {
     const ExprNode& n = program_.node(id);
     switch (n.op) {
@@ -62,15 +49,6 @@ class OslPrinter : public ProgramPrinter {
         return {number(n.value[0]), n.value[0] < 0 ? 5 : 6};
       case Op::Input:
         return {n.name, 6};
-      case Op::Add:
-      case Op::Sub:
-        return infix(name_of(n.op), n, 3);
-      case Op::Mul:
-      case Op::Div:
-        return infix(name_of(n.op), n, 4);
-      case Op::Neg:
-        return {fmt::format("-{}", use(n.args[0], 6)), 5};
-      case Op::Sqrt:
       case Op::Cbrt:
       case Op::Exp:
       case Op::Log:
@@ -78,32 +56,15 @@ class OslPrinter : public ProgramPrinter {
       case Op::Cos:
       case Op::Atan:
       case Op::Pow:
-      case Op::Abs:
-      case Op::Min:
-      case Op::Max:
       case Op::MakeColor:
         return call(name_of(n.op), n);
       case Op::Log1p:
       case Op::Expm1:
       case Op::MaxComponent:
         return call(library_name(n.op), n);
-      case Op::Less:
-      case Op::LessEqual:
-        return infix(name_of(n.op), n, 2);
-      case Op::And:
-        return {use(n.args[0], 2) + " && " + use(n.args[1], 2), 1};
-      case Op::Or:
-        return {use(n.args[0], 2) + " || " + use(n.args[1], 2), 1};
-      case Op::Not:
-        return {fmt::format("!{}", use(n.args[0], 6)), 5};
-      case Op::Select: {
+      case Op::Select:
         // Both arms of an OSL conditional must have one type.
-        const auto arm = [&](std::size_t i) {
-          const bool promote = n.type == ExprType::Color && program_.node(n.args[i]).type != ExprType::Color;
-          return promote ? "color(" + use(n.args[i], 0) + ")" : use(n.args[i], 1);
-        };
-        return {use(n.args[0], 1) + " ? " + arm(1) + " : " + arm(2), 0};
-      }
+        return {use(n.args[0], 1) + " ? " + arm(n, 1, 1) + " : " + arm(n, 2, 1), 0};
       case Op::Lookup: {
         std::string sizes, positions;
         for (std::size_t i = 0; i < n.args.size(); ++i) {
@@ -113,10 +74,8 @@ class OslPrinter : public ProgramPrinter {
         }
         return {table_function(*n.table) + "(" + array_names_.at(n.name) + sizes + positions + ")", 6};
       }
-      case Op::LoopOut:
-        return {loop_out(n), 6};
       default:
-        throw ExprError(std::string("no OSL for ") + name_of(n.op));
+        return CLikePrinter::text(id);
     }
   }
 
