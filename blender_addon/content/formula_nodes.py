@@ -309,6 +309,7 @@ def _direction(w, u, v):
 _SEEN = [
     ["towards", "VECTOR"],
     ["drop", "FLOAT"],
+    ["solid_angle", "FLOAT"],
     ["chord", "FLOAT"],
     ["reach", "FLOAT"],
     ["flat", "FLOAT"],
@@ -354,10 +355,12 @@ def _point_of(w, towards, drop, anywhere, u):
 
 
 def _lamp_group(parts):
-    """The group that makes a lamp's closure, which carries the model's value in its cone. Cycles
-    skips its computations where the factor `lit` is 0."""
+    """The group that makes a lamp's closure, which carries the model's value in its cone, or the
+    part of it that random directions leave. Cycles skips its computations where the factor `lit`
+    is 0."""
     vectors = (*_SLOT, "towards", "at", "view", "tangent", "bitangent", "normal", "anywhere")
-    numbers = ("drop", "chord", "flat", "lit", "room", "whole", "u_0", "u_1", "u_2")
+    of_cone = ("chord", "flat", "room", "solid_angle", "whole")
+    numbers = (*of_cone, "drop", "lit", "u_0", "u_1", "u_2")
     inputs = [[name, "VECTOR"] for name in vectors] + [[name, "FLOAT"] for name in numbers]
     inputs += _AXES
     inputs += [[name, kind] for name, kind in parts.inputs("value").items() if name != "wi"]
@@ -370,11 +373,10 @@ def _lamp_group(parts):
         on_flat = here.add("flat", **found)
         point = w.mix(found["flat"], point, on_flat["wi"], True)
         frame = (found["tangent"], found["bitangent"], found["normal"])
-        value = here.add("value", **(found | {"wi": _local(w, point, frame)}))["value"]
-        emphasis = w.mix(found["flat"], 1.0, on_flat["emphasis"])
-        value = w.scaled(value, w.math("MULTIPLY", emphasis, found["whole"]))
-        cone = {name: found[name] for name in ("chord", "flat", "room")}
-        lobe = here.add("lobe", value=value, u_2=found["u_2"], **cone)
+        at_point = here.add("value", **(found | {"wi": _local(w, point, frame)}))
+        cone = {name: found[name] for name in of_cone}
+        cone |= {"emphasis": on_flat["emphasis"], "u_2": found["u_2"]}
+        lobe = here.add("lobe", **at_point, **cone)
         toon = w.toon(lobe["color"], lobe["size"], w.half(found["towards"], found["view"]))
         return {"BSDF": w.shown(found["lit"], toon)}
 
@@ -523,7 +525,8 @@ def _rest(w, parts, surface, given, lamps, narrow):
     # From the last slot to the first, as in _keep_apart().
     met = 0.0
     for lamp in reversed(lamps):
-        inside = parts.add("met", **{"at": surface.place, "ray": ray} | lamp)["met"]
+        here = {"at": surface.place, "ray": ray, "density": drawn["density"]}
+        inside = parts.add("met", **here | lamp)["met"]
         met = w.math("MAXIMUM", met, w.math("MULTIPLY", inside, lamp["shown"]))
     lost = w.math("MAXIMUM", hidden, met)
     chance = w.math("FRACT", w.math("MULTIPLY", given["u_0"], 4096.0))

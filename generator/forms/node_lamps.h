@@ -3,8 +3,13 @@
 // drops closures that subtract light. So the light that a closure carries for a lamp can't be subtracted elsewhere and
 // has to be left out there.
 //
-// Lamps: one Toon closure each, constant over the lamp's cone, with the model's f cos at a random point of the lamp.
-// Rest: a direction drawn from the model, which carries nothing if it lies in one of these cones.
+// Lamps: one Toon closure each, constant over the lamp's cone, with a part of the model's f cos at a random point of the
+// lamp.
+// Rest: a direction drawn from the model. If it hits one of these lamps, it carries the other part of f cos.
+//
+// The two parts are those of multiple importance sampling (Veach and Guibas 1995, power heuristic with exponent 2). So
+// drawn directions find the highlight of a lobe that is narrow for its lamp, and the closure has the light of a lamp
+// that is small for the lobe. The two parts add up to f cos in every direction.
 //
 // A ball or a sun fills its cone. A rectangle or an ellipse does not: its cone is the largest that fits into it, and
 // carries the light of the whole lamp. Cycles drops closures with a small weight, so the cone of a small lamp is
@@ -47,6 +52,7 @@ template <class T> LampAxes<T> lamp_axes(const LampSlot<T>& slot) {
 template <class T> struct LampCone {
   Vec3<T> towards;  ///< unit vector along the axis
   T drop;           ///< 1 - cos of the radius of the largest cone within the lamp
+  T solid_angle;    ///< of that cone; 0 for a lamp that drawn directions can't hit
   T chord;          ///< radius of the closure; for a ball or a sun it includes a seam
   T reach;          ///< radius of a cone around the whole lamp
   T flat;           ///< 1 for a rectangle or an ellipse, otherwise 0
@@ -88,9 +94,13 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& slot, const LampAxes<T
   const T facing = dot(lamp.away, cone.towards), slant = sqrt(T(1) - facing * facing);
   const T within = minimum(lamp.half_across, lamp.half_along) * nearness;
   const T tangent = within * facing / (T(1) + within * slant), tangent2 = tangent * tangent;
-  const T sine2 = maximum(select(ball, of_ball, select(flat, tangent2 / (T(1) + tangent2), of_sun)), T(kPoint));
+  const T size2 = select(ball, of_ball, select(flat, tangent2 / (T(1) + tangent2), of_sun));
+  const T sine2 = maximum(size2, T(kPoint));
   const T sine = sqrt(sine2);
   cone.drop = sine2 / (T(1) + sqrt(T(1) - sine2));
+  // blender_addon/lamps/slots.py: the first size is negative for lamps that drawn directions don't hit.
+  const auto hit = size2 > T(kPoint) && T(0) < slot.shape.y;
+  cone.solid_angle = select(hit, cone.drop * T(2 * kPi), T(0));
   // The cone of a rectangle carries all of the rectangle's light, so it must not be widened.
   cone.chord = sqrt(T(2) * cone.drop) + select(flat, T(0), T(2 * kNarrow));
   const T diagonal = sqrt(sqr(lamp.half_across) + sqr(lamp.half_along));
@@ -133,9 +143,18 @@ template <class T> FlatPoint<T> flat_point(const LampSlot<T>& slot, const LampAx
   return out;
 }
 
-/// 1 if a drawn direction hits a lamp, or passes so close that its lobe would; otherwise 0.
-template <class T> T meets(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at, const LampCone<T>& cone,
-                           const Vec3<T>& ray) {
+/// The part of f cos in one direction that the lamp's closure carries; the drawn direction carries the rest of it.
+/// `density`: pdf of drawn directions there. `emphasis`: see FlatPoint, 1 for a ball or a sun.
+template <class T> T part_of_lamp(const LampCone<T>& cone, const T& emphasis, const T& density) {
+  // The point of a rectangle has the pdf 1 / (solid_angle emphasis), and since Cycles samples all of the rectangle, only
+  // one sample in `emphasis` meets its cone.
+  return T(1) / (T(1) + sqr(density * (cone.solid_angle * sqr(emphasis))));
+}
+
+/// What the closure of a lamp carries of f cos in a drawn direction: part_of_lamp() if the direction hits the lamp or
+/// passes so close that its lobe would, otherwise 0.
+template <class T> T met_part(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
+                              const LampCone<T>& cone, const Vec3<T>& ray, const T& density) {
   const auto flat = slot.shape.x > T(2.5) && slot.shape.x<T(4.5), round = slot.shape.x> T(3.5);
   const Vec3<T> centre = slot.place - at;
   const T slope = dot(lamp.away, ray), distance = dot(lamp.away, centre) / slope;
@@ -145,7 +164,10 @@ template <class T> T meets(const LampSlot<T>& slot, const LampAxes<T>& lamp, con
   const T y = (abs(dot(off, lamp.along)) - seam) / lamp.half_along;
   const T farthest = select(round, maximum(x, T(0)) * x + maximum(y, T(0)) * y, maximum(x, y));
   const auto on_flat = farthest < T(1) && T(0) < slope;
-  return select(flat, select(on_flat, T(1), T(0)), select(length(ray - cone.towards) < cone.chord, T(1), T(0)));
+  const T met = select(flat, select(on_flat, T(1), T(0)), select(length(ray - cone.towards) < cone.chord, T(1), T(0)));
+  const T area = lamp.half_across * lamp.half_along * select(round, T(kPi), T(4));
+  const T emphasis = area * slope / (sqr(distance) * cone.solid_angle);
+  return met * part_of_lamp(cone, select(flat, emphasis, T(1)), density);
 }
 
 /// Russian roulette for a closure with a small weight, which Cycles would drop: it is kept at random, with a weight
@@ -156,16 +178,18 @@ template <class T> T kept(const T& weight, const T& u) {
   return select(u < chance, T(1), T(0)) / minimum(chance, T(1));
 }
 
-/// The inputs of a Toon closure that carries `value`, as f cos, over the cone. For a ball or a sun it may be wider than
-/// the cone.
+/// The inputs of a Toon closure that carries `value`, as f cos, over the cone: as much of it as part_of_lamp() says. For
+/// a ball or a sun it may be wider than the cone.
 template <class T> struct ToonLobe {
   Rgb<T> color;
   T size;  ///< in units of 90 degrees, as in the node
 };
-/// `room`: the radius that it may have without covering another lamp.
-template <class T> ToonLobe<T> toon_lobe(const LampCone<T>& cone, const T& room, const Rgb<T>& value, const T& u) {
+/// `room`: the radius that it may have without covering another lamp. `emphasis`, `density`: at the point where the value
+/// is taken.
+template <class T> ToonLobe<T> toon_lobe(const LampCone<T>& cone, const T& emphasis, const T& density, const T& room,
+                                         const Rgb<T>& value, const T& u) {
   constexpr double kWidened = 2e-4;
-  const T largest = max_component(value);
+  const T factor = emphasis * cone.whole * part_of_lamp(cone, emphasis, density), largest = max_component(value) * factor;
   const T wide = minimum(sqrt(T(kWidened / kPi) / largest), room);
   const T chord = maximum(cone.chord, select(cone.flat > T(0.5), T(0), wide)), chord2 = chord * chord;
   const T extent = chord2 * T(kPi);
@@ -173,7 +197,7 @@ template <class T> ToonLobe<T> toon_lobe(const LampCone<T>& cone, const T& room,
   // The angle 2 asin(chord / 2), with a relative error of 1e-4.
   out.size = chord * (T(2 / kPi) +
                       chord2 * (T(2 / kPi / 24) + chord2 * (T(2 / kPi * 3 / 640) + chord2 * T(2 / kPi * 5 / 7168))));
-  out.color = value * (extent * kept(largest * extent, u));
+  out.color = value * (factor * extent * kept(largest * extent, u));
   return out;
 }
 

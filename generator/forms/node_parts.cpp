@@ -78,6 +78,7 @@ NodeProgram record_cone() {
     const LampCone<Expr> cone = cone_of(slot_input(), axes_input(), input3("at"), input3("view"), input3("normal"));
     p.output("towards", cone.towards);
     p.output("drop", cone.drop);
+    p.output("solid_angle", cone.solid_angle);
     p.output("chord", cone.chord);
     p.output("reach", cone.reach);
     p.output("flat", cone.flat);
@@ -100,7 +101,8 @@ NodeProgram record_met() {
     LampCone<Expr> cone;
     cone.towards = input3("towards");
     cone.chord = Expr::input("chord");
-    p.output("met", meets(slot_input(), axes_input(), input3("at"), cone, input3("ray")));
+    cone.solid_angle = Expr::input("solid_angle");
+    p.output("met", met_part(slot_input(), axes_input(), input3("at"), cone, input3("ray"), Expr::input("density")));
   });
 }
 NodeProgram record_lobe() {
@@ -108,16 +110,19 @@ NodeProgram record_lobe() {
     LampCone<Expr> cone;
     cone.chord = Expr::input("chord");
     cone.flat = Expr::input("flat");
-    const ToonLobe<Expr> lobe = toon_lobe(cone, Expr::input("room"), Rgb<Expr>::input("value"), Expr::input("u_2"));
+    cone.solid_angle = Expr::input("solid_angle");
+    cone.whole = Expr::input("whole");
+    const Expr emphasis = select(cone.flat > Expr(0.5), Expr::input("emphasis"), Expr(1.0));
+    const ToonLobe<Expr> lobe = toon_lobe(cone, emphasis, Expr::input("density"), Expr::input("room"),
+                                          Rgb<Expr>::input("value"), Expr::input("u_2"));
     p.output("color", lobe.color);
     p.output("size", lobe.size);
   });
 }
 NodeProgram record_rest() {
   return recorded([](Program& p) {
-    const Rgb<Expr> weight = Rgb<Expr>::input("weight");
-    const Expr factor = kept(max_component(weight), Expr::input("u"));
-    p.output("color", weight * (factor * (Expr(1.0) - Expr::input("lost"))));
+    const Rgb<Expr> weight = Rgb<Expr>::input("weight") * (Expr(1.0) - Expr::input("lost"));
+    p.output("color", weight * kept(max_component(weight), Expr::input("u")));
   });
 }
 

@@ -94,7 +94,7 @@ struct NodeRecording {
   Json closures, of_base;  ///< kinds of closures, and the names of their inputs
   Program give;            ///< computes the inputs of `closures`
   Program base;            ///< computes the inputs of `of_base`
-  Program value, draw;     ///< f cos - base; a drawn direction and its weight
+  Program value, draw;     ///< f cos - base and pdf; a drawn direction, its weight and pdf
 };
 
 /// Uses the current recorder; `fixed` must contain every choice.
@@ -127,11 +127,15 @@ NodeRecording record_nodes(const Model& model, const ParamValues& fixed) {
   const ClosureSum<Expr> base = record_base(model, fixed, *brdf, out.base, out.of_base);
   const Rgb<Expr> f = brdf->eval(wi, wo) * abs(wi.z);
   out.value.output("value", base.empty() ? f : f - evaluate(base, wi, wo));
+  out.value.output("density", brdf->pdf(wi, wo));
   const Under* of = base.empty() ? nullptr : under(model);
-  const Sample<Expr> s = of && of->sample ? of->sample(model.info(), fixed, wo, recorded_u(), Expr::input("stands"))
-                                          : brdf->sample(wo, recorded_u());
+  const bool beside = of && of->sample;
+  const Sample<Expr> s =
+      beside ? of->sample(model.info(), fixed, wo, recorded_u(), Expr::input("stands")) : brdf->sample(wo, recorded_u());
   out.draw.output("wi", s.wi);
   out.draw.output("weight", base.empty() ? s.weight : s.weight - evaluate(base, s.wi, wo) / s.pdf);
+  // In every direction the same as for the lamps.
+  out.draw.output("density", beside ? brdf->pdf(s.wi, wo) : s.pdf);
   if (model.has_mirror()) {
     out.give.output("weight_0", brdf->mirror(wo));
     out.closures.push_back({{"kind", "mirror"}, {"weight", "weight_0"}});
