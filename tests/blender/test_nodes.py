@@ -207,7 +207,8 @@ def test_a_lobe_that_is_narrow_for_its_lamp(extension, model, values, light):
     noise = a.var(0, ddof=1).sum() / b.var(0, ddof=1).sum()
     print(f"{model}: {100 * off:+.2f} ± {100 * error:.2f} %, noise {noise:.2f}")
     assert abs(off) < 4.5 * error + 5e-3
-    assert noise < 4
+    # With all of the light in the lamp's closure it is from 10 to 3,500.
+    assert noise < 7
 
 
 @pytest.mark.parametrize(
