@@ -15,7 +15,9 @@ namespace {
 
 void write_sample(const measure::BoundModel& bound, const std::string& where, const Vec3<double>& wo,
                   const Vec3<double>& u, CsvWriter& out) {
-  const Sample<double> s = bound.brdf->sample(wo, u);
+  // Below the surface of a model of one side every sample is lost, and formulas may have no direction there.
+  const bool lost = !(wo.z > 0) && !bound.model->two_sided();
+  const Sample<double> s = lost ? Sample<double>{{0, 0, 1}, {0, 0, 0}, 0} : bound.brdf->sample(wo, u);
   const std::string label = where + ": " + bound.label;
   measure::require_value(s.pdf, "pdf", label, s.wi, wo);
   measure::require_value(s.weight, "weight", label, s.wi, wo);
@@ -37,7 +39,7 @@ void add_sample_command(CLI::App& app) {
   CLI::App* cmd =
       app.add_subcommand("sample",
                          "Directions sampled from the model, with their weights f cos / pdf and pdfs per solid angle.\n"
-                         "A sample with pdf 0 is lost (below the horizon); its weight is 0.\n"
+                         "A sample with pdf 0 is lost (below the horizon); its weight is 0, and its direction (0, 0, 1) if wo is below.\n"
                          "stdin:  CSV with header wo_x,wo_y,wo_z,u1,u2,u3 (0 <= u < 1), unless --count is given\n"
                          "stdout: CSV with header wi_x,wi_y,wi_z,weight_r,weight_g,weight_b,pdf");
   cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();

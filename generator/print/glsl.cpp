@@ -15,7 +15,7 @@ namespace brdfc::print {
 namespace {
 
 /// Keywords and reserved words of GLSL ES 3.00 (section 3.7), then built-in functions (chapter 8).
-constexpr const char* kWords = R"(
+constexpr const char* kGlslWords = R"(
   const uniform layout centroid flat smooth break continue do for while switch case default if else in out inout float int
   void bool true false invariant discard return mat2 mat3 mat4 mat2x2 mat2x3 mat2x4 mat3x2 mat3x3 mat3x4 mat4x2 mat4x3
   mat4x4 vec2 vec3 vec4 ivec2 ivec3 ivec4 bvec2 bvec3 bvec4 uint uvec2 uvec3 uvec4 lowp mediump highp precision sampler2D
@@ -102,7 +102,7 @@ class GlslPrinter : public CLikePrinter {
 
 bool is_glsl_word(const std::string& name) {
   static const std::set<std::string> words = [] {
-    std::istringstream in(kWords);
+    std::istringstream in(kGlslWords);
     return std::set<std::string>{std::istream_iterator<std::string>(in), {}};
   }();
   // Names with two underscores belong to the implementation.

@@ -9,7 +9,7 @@ namespace brdfc::print {
 namespace {
 
 /// Separated by spaces, one kind after the other.
-constexpr const char* kWords = R"(
+constexpr const char* kOslWords = R"(
   and break closure color continue do else emit float for if illuminance illuminate int matrix normal not or output point
   public return string struct vector void while shader surface displacement volume light
 
@@ -66,7 +66,7 @@ bool is_prefixed(const std::string& name) {
 }  // namespace
 
 const std::set<std::string>& osl_words() {
-  static const std::set<std::string> words = split(kWords);
+  static const std::set<std::string> words = split(kOslWords);
   return words;
 }
 

@@ -315,9 +315,9 @@ class ArrayModel:
             results = formula(np, *arguments)
             results = results if len(kinds) > 1 else (results,)
             if lost is not None:
-                directed = 3 if what == "sample" else 0
+                instead = (0.0, 0.0, 1.0, 0.0, 0.0) if what == "sample" else (0.0,)
                 results = [
-                    r if i < directed else np.where(lost, 0.0, r) for i, r in enumerate(results)
+                    np.where(lost, value, r) for value, r in zip(instead, results, strict=True)
                 ]
         out = []
         for result, kind in zip(results, kinds, strict=True):

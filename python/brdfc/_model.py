@@ -144,7 +144,8 @@ class Model:
         """Directions drawn from the model.
 
         wo: unit vectors (..., 3); u: numbers in [0, 1), (..., 3): choice of lobe, and two for the
-        direction.
+        direction. Where wo is below the surface of a model of one side, the sample is (0, 0, 1),
+        with weight and pdf 0.
         """
         numbers = self._vectors("u", u)
         if not np.all((numbers >= 0) & (numbers < 1)):
@@ -345,6 +346,11 @@ class Model:
                         out, results if len(out) > 1 else (results,), strict=True
                     ):
                         array[..., block] = result
+        if what == "sample" and not self.two_sided:
+            # Every sample is lost, and formulas may have no direction there.
+            lost = np.broadcast_to(vectors[0][..., 2] <= 0, shape).reshape(size)
+            for array, value in zip(out, (0.0, 0.0, 1.0, 0.0, 0.0), strict=True):
+                array[..., lost] = value
         for array in out:
             if not np.isfinite(array).all():
                 at = int(np.argwhere(~np.isfinite(array))[0][-1])

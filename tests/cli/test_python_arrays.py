@@ -159,9 +159,10 @@ def test_values_are_those_on_numpy(brdfc, library, name):
     wi[0, :3] = wo[1, 0] = [0, 0, 1]
     wi[0, 3] = wo[0, 4] = [1, 0, 0]
     up, u = above(wo), random.uniform(size=wo.shape)
-    if not model.two_sided:  # else what is lost has any direction
+    if not model.two_sided:
         up[..., 2] = np.maximum(up[..., 2], 1e-3)
         up = unit(up)
+        up[1, 1:3] = [[0, 0, -1], [0.6, 0, -0.8]]  # lost
     textured = {}
     for parameter, p in numeric(model).items():
         if kind(p) == "Number":

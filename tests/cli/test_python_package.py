@@ -189,6 +189,21 @@ def test_values_are_those_of_the_formulas_in_cpp(brdfc, name):
 
 
 @pytest.mark.parametrize("name", MODELS)
+def test_samples_below_the_surface_are_lost(brdfc, name):
+    """Frames about the mirror direction do not exist along the axis, so formulas may give NaN."""
+    model = brdfc.model(name)
+    wo, u = np.array([[0, 0, -1], [0.6, 0, -0.8], [1, 0, 0]]), np.full((3, 3), 0.3)
+    s = model.sample(wo, u)
+    if model.two_sided:
+        assert np.isfinite(s.wi).all() and np.isfinite(s.weight).all()
+        return
+    assert (s.wi == [0, 0, 1]).all() and not s.weight.any() and not s.pdf.any()
+    if model.formulas[next(iter(model.formulas))].sample is not None:
+        found = tool("sample", name, {}, np.hstack([wo, u]), "wo_x,wo_y,wo_z,u1,u2,u3")
+        assert (found == [0, 0, 1, 0, 0, 0, 0]).all()
+
+
+@pytest.mark.parametrize("name", MODELS)
 def test_samples_are_those_of_the_formulas_in_cpp(brdfc, name):
     model, random = brdfc.model(name), np.random.default_rng(6)
     points = []

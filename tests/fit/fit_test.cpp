@@ -32,23 +32,23 @@ namespace {
 
 using testing::HasSubstr;
 
-struct Row {
+struct FitRow {
   const char* model;
   std::vector<std::string> values;
   double median, worst;  ///< relative L1 over views
 };
 /// Bounds are 25 % above the measured errors.
-const Row kRows[] = {{"modified_phong", {"ks=1", "e=50"}, 0.006, 0.06},
-                     {"phong", {"ks=1", "e=20"}, 0.007, 0.2},
-                     {"phong", {"e=1000"}, 0.007, 0.14},
-                     {"max_phong", {"e=50"}, 0.02, 0.2},
-                     {"oren_nayar", {"sigma=0.6"}, 0.016, 0.04},
-                     {"lossless", {}, 0.017, 0.03},
-                     {"ward", {}, 0.012, 0.29},
-                     {"blinn", {"ks=0.9,0.5,0.1", "e=100"}, 0.01, 0.34}};
+const FitRow kFitRows[] = {{"modified_phong", {"ks=1", "e=50"}, 0.006, 0.06},
+                           {"phong", {"ks=1", "e=20"}, 0.007, 0.2},
+                           {"phong", {"e=1000"}, 0.007, 0.14},
+                           {"max_phong", {"e=50"}, 0.02, 0.2},
+                           {"oren_nayar", {"sigma=0.6"}, 0.016, 0.04},
+                           {"lossless", {}, 0.017, 0.03},
+                           {"ward", {}, 0.012, 0.29},
+                           {"blinn", {"ks=0.9,0.5,0.1", "e=100"}, 0.01, 0.34}};
 
 TEST(Fit, ComesAsCloseAsMeasured) {
-  for (const Row& row : kRows) {
+  for (const FitRow& row : kFitRows) {
     const Model& m = find_model(row.model);
     std::vector<double> l1;
     for (const ViewError& e : fit_of(m, values_of(m, row.values)).errors()) {

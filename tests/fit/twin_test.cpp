@@ -19,20 +19,21 @@
 namespace brdfc::fit {
 namespace {
 
-struct Row {
+struct TwinRow {
   const char* model;
   std::vector<std::string> values;
   double median;  ///< median of the relative L1 error over views, 25 % above the measured value
 };
-const Row kRows[] = {{"blinn", {"e=100"}, 0.017}, {"phong", {"ks=0.9,0.5,0.1", "e=50"}, 0.05}, {"coupled", {}, 0.048}};
+const TwinRow kTwinRows[] = {
+    {"blinn", {"e=100"}, 0.017}, {"phong", {"ks=0.9,0.5,0.1", "e=50"}, 0.05}, {"coupled", {}, 0.048}};
 
-const Twin& twin_of_row(const Row& row) {
+const Twin& twin_of_row(const TwinRow& row) {
   const Model& m = find_model(row.model);
   return twin_of(m, values_of(m, row.values));
 }
 
 TEST(Twin, ComesAsCloseAsMeasured) {
-  for (const Row& row : kRows) {
+  for (const TwinRow& row : kTwinRows) {
     std::vector<double> l1;
     for (const ViewError& e : twin_of_row(row).errors()) {
       l1.push_back(e.relative_l1);
@@ -61,7 +62,7 @@ std::array<double, 2> by_grid(const Brdf<double>& brdf, const ClosureSum<double>
 }
 
 TEST(Twin, StatesItsError) {
-  const Row& row = kRows[1];
+  const TwinRow& row = kTwinRows[1];
   const Model& m = find_model(row.model);
   const auto brdf = m.make_double(values_of(m, row.values));
   const Twin& twin = twin_of_row(row);
@@ -109,7 +110,7 @@ TEST(Twin, IsKept) {
 }
 
 TEST(Twin, TakesWhatNodesAccept) {
-  for (const Row& row : kRows) {
+  for (const TwinRow& row : kTwinRows) {
     const Model& m = find_model(row.model);
     const auto j = nlohmann::json::parse(forms::form("twin")->write(m, {}, {values_of(m, row.values)}).source);
     for (const auto& closure : j.at("closures")) {

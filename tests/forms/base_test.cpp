@@ -25,8 +25,8 @@ Vec3<Expr> recorded(const char* name) {
   return {Expr::input(n + "_x"), Expr::input(n + "_y"), Expr::input(n + "_z")};
 }
 
-using Inputs = std::map<std::string, std::array<double, 3>>;
-void give(Inputs& inputs, const std::string& name, const Vec3<double>& v) {
+using InputValues = std::map<std::string, std::array<double, 3>>;
+void give(InputValues& inputs, const std::string& name, const Vec3<double>& v) {
   inputs[name + "_x"] = {v.x, v.x, v.x};
   inputs[name + "_y"] = {v.y, v.y, v.y};
   inputs[name + "_z"] = {v.z, v.z, v.z};
@@ -64,10 +64,10 @@ TEST(Closure, StretchesFacetsAlongATangentOfTheSurface) {
       EXPECT_NEAR(found.g, expected.g, 1e-12 * (1 + expected.g));
       EXPECT_NEAR(found.r, expected.r, 1e-12 * (1 + expected.r));
 
-      Inputs inputs = {{"weight", {0.2, 0.5, 1}},
-                       {"alpha", {alpha, alpha, alpha}},
-                       {"across", {across, across, across}},
-                       {"angle", {angle, angle, angle}}};
+      InputValues inputs = {{"weight", {0.2, 0.5, 1}},
+                            {"alpha", {alpha, alpha, alpha}},
+                            {"across", {across, across, across}},
+                            {"angle", {angle, angle, angle}}};
       give(inputs, "wi", wi);
       give(inputs, "wo", wo);
       EXPECT_NEAR(program.run<double>(inputs).at("f_cos")[1], expected.g, 1e-12 * (1 + expected.g));
@@ -111,7 +111,7 @@ TEST(Closure, LooksARampUpWithoutAnIndex) {
   for (int i = 0; i <= 100; ++i) {
     const double z = i / 100.;
     const Vec3<double> wi{std::sqrt(1 - z * z), 0, z};
-    Inputs inputs;
+    InputValues inputs;
     give(inputs, "wi", wi);
     const std::array<double, 3> found = of_varied.run<double>(inputs).at("f_cos");
     const Rgb<double> expected = evaluate(c, wi, wo);
@@ -122,49 +122,49 @@ TEST(Closure, LooksARampUpWithoutAnIndex) {
   for (const double outside : {-0.5, 0., 1., 2.}) EXPECT_EQ(ramp8(c.ramp, outside).r, outside > 0.5 ? 49 : 0);
 }
 
-struct Row {
+struct BaseRow {
   const char* model;
   std::vector<std::string> values;
   double above, low;  ///< relative L1 error seen at 10 and 75 degrees
 };
 /// Bounds are 25 % above the measured errors.
-const Row kRows[] = {{"ashikhmin_shirley", {}, 0.008, 0.18},
-                     {"ashikhmin_shirley", {"part=specular", "rs=0.9", "nu=100", "nv=1000"}, 0.03, 0.2},
-                     {"ashikhmin_shirley", {"diffuse=tabulated"}, 0.035, 0.15},
-                     {"blinn", {}, 0.03, 0.04},
-                     {"cook_torrance", {}, 0.007, 0.16},
-                     {"coupled", {}, 0.006, 0.006},
-                     {"coupled", {"fresnel=dielectric"}, 0.006, 0.006},
-                     {"factors", {}, 0.048, 0.48},
-                     {"factors", {"ax=0.05", "ay=0.4"}, 0.061, 0.35},
-                     {"glossy_reflector", {}, 0.023, 0.026},
-                     {"glossy_reflector", {"below=lose", "e=10"}, 0.023, 0.023},
-                     {"lafortune", {}, 0.007, 0.05},
-                     {"lossless", {}, 0.1, 0.034},
-                     {"lossless", {"n=1"}, 0.006, 0.004},
-                     {"max_phong", {}, 0.01, 0.23},
-                     {"max_phong", {"e=100"}, 0.01, 0.14},
-                     {"microfacet", {}, 6e-5, 0.068},
-                     {"microfacet", {"masking=v_cavity"}, 0.047, 0.45},
-                     {"microfacet", {"masking=smith_separable"}, 6e-5, 0.061},
-                     {"microfacet", {"distribution=beckmann"}, 2e-5, 0.062},
-                     {"oren_nayar", {}, 0.0005, 0.021},
-                     {"oren_nayar", {"form=qualitative"}, 0.012, 0.059},
-                     {"phong", {}, 0.021, 0.021},
-                     {"phong", {"e=3"}, 0.022, 0.02},
-                     {"phong", {"e=1"}, 0.044, 0.041},
-                     {"phong_material", {}, 0.01, 0.18},
-                     {"schlick", {}, 0.035, 0.08},
-                     {"schlick", {"p=0.3"}, 0.24, 0.2},
-                     {"schlick_double", {}, 0.001, 0.017},
-                     {"ward", {}, 0.002, 0.085},
-                     {"ward", {"ax=0.5", "ay=0.05"}, 0.02, 0.2},
-                     {"ward", {"normalisation=duer"}, 0.013, 0.045},
-                     {"ward", {"normalisation=ward"}, 0.03, 0.24}};
+const BaseRow kBaseRows[] = {{"ashikhmin_shirley", {}, 0.008, 0.18},
+                             {"ashikhmin_shirley", {"part=specular", "rs=0.9", "nu=100", "nv=1000"}, 0.03, 0.2},
+                             {"ashikhmin_shirley", {"diffuse=tabulated"}, 0.035, 0.15},
+                             {"blinn", {}, 0.03, 0.04},
+                             {"cook_torrance", {}, 0.007, 0.16},
+                             {"coupled", {}, 0.006, 0.006},
+                             {"coupled", {"fresnel=dielectric"}, 0.006, 0.006},
+                             {"factors", {}, 0.048, 0.48},
+                             {"factors", {"ax=0.05", "ay=0.4"}, 0.061, 0.35},
+                             {"glossy_reflector", {}, 0.023, 0.026},
+                             {"glossy_reflector", {"below=lose", "e=10"}, 0.023, 0.023},
+                             {"lafortune", {}, 0.007, 0.05},
+                             {"lossless", {}, 0.1, 0.034},
+                             {"lossless", {"n=1"}, 0.006, 0.004},
+                             {"max_phong", {}, 0.01, 0.23},
+                             {"max_phong", {"e=100"}, 0.01, 0.14},
+                             {"microfacet", {}, 6e-5, 0.068},
+                             {"microfacet", {"masking=v_cavity"}, 0.047, 0.45},
+                             {"microfacet", {"masking=smith_separable"}, 6e-5, 0.061},
+                             {"microfacet", {"distribution=beckmann"}, 2e-5, 0.062},
+                             {"oren_nayar", {}, 0.0005, 0.021},
+                             {"oren_nayar", {"form=qualitative"}, 0.012, 0.059},
+                             {"phong", {}, 0.021, 0.021},
+                             {"phong", {"e=3"}, 0.022, 0.02},
+                             {"phong", {"e=1"}, 0.044, 0.041},
+                             {"phong_material", {}, 0.01, 0.18},
+                             {"schlick", {}, 0.035, 0.08},
+                             {"schlick", {"p=0.3"}, 0.24, 0.2},
+                             {"schlick_double", {}, 0.001, 0.017},
+                             {"ward", {}, 0.002, 0.085},
+                             {"ward", {"ax=0.5", "ay=0.05"}, 0.02, 0.2},
+                             {"ward", {"normalisation=duer"}, 0.013, 0.045},
+                             {"ward", {"normalisation=ward"}, 0.03, 0.24}};
 
 TEST(Base, CarriesWhatWasMeasured) {
   std::set<std::string> seen;
-  for (const Row& row : kRows) {
+  for (const BaseRow& row : kBaseRows) {
     const Model& m = find_model(row.model);
     ASSERT_TRUE(m.has_base()) << row.model;
     seen.insert(row.model);
@@ -240,7 +240,7 @@ TEST(Base, IsRecordedAlikeForAllChoices) {
       of_lamp = std::max(of_lamp, given.operations());
 
       const measure::BoundModel bound = measure::bind_model(*m, complete(m->info(), fixed));
-      Inputs inputs;
+      InputValues inputs;
       for (const auto& [parameter, value] : bound.values) {
         if (const double* v = std::get_if<double>(&value)) inputs[parameter] = {*v, *v, *v};
         if (const auto* c = std::get_if<std::array<double, 3>>(&value)) inputs[parameter] = *c;

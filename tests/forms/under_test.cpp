@@ -49,24 +49,24 @@ TEST(Under, IsNowhereAboveTheModel) {
   }
 }
 
-struct Row {
+struct UnderRow {
   const char* model;
   std::vector<std::string> values;
   double share;  ///< the base's minimum share of the model's light, seen at 45 degrees
 };
-const Row kRows[] = {{"ashikhmin_shirley", {"rs=0,0,0"}, 0.9},
-                     {"ashikhmin_shirley", {"part=diffuse"}, 0.95},
-                     {"coupled", {}, 0.94},
-                     {"oren_nayar", {}, 0.75},
-                     {"oren_nayar", {"form=qualitative"}, 0.9},
-                     {"phong_material", {"ks=0", "kr=0"}, 0.999},
-                     {"schlick", {}, 0.75},
-                     {"schlick", {"rough=0.9"}, 0.7},
-                     {"schlick_double", {}, 0.9}};
+const UnderRow kUnderRows[] = {{"ashikhmin_shirley", {"rs=0,0,0"}, 0.9},
+                               {"ashikhmin_shirley", {"part=diffuse"}, 0.95},
+                               {"coupled", {}, 0.94},
+                               {"oren_nayar", {}, 0.75},
+                               {"oren_nayar", {"form=qualitative"}, 0.9},
+                               {"phong_material", {"ks=0", "kr=0"}, 0.999},
+                               {"schlick", {}, 0.75},
+                               {"schlick", {"rough=0.9"}, 0.7},
+                               {"schlick_double", {}, 0.9}};
 
 TEST(Under, CarriesWhatWasMeasured) {
   std::set<std::string> seen;
-  for (const Row& row : kRows) {
+  for (const UnderRow& row : kUnderRows) {
     const Model& m = find_model(row.model);
     seen.insert(row.model);
     ASSERT_TRUE(under(m)) << row.model;

@@ -27,7 +27,7 @@ double f(const measure::BoundModel& b, const Vec3<double>& wi, const Vec3<double
 }
 
 /// The albedo at a polar angle in degrees.
-double albedo_at(const measure::BoundModel& b, double angle) {
+double albedo_at_degrees(const measure::BoundModel& b, double angle) {
   return measure::albedo(*b.brdf, std::cos(degrees(angle))).total().g;
 }
 
@@ -45,10 +45,10 @@ TEST(Phong, IsNotReciprocalAndGainsOrLosesWithTheExponent) {
   const measure::BoundModel b = bind("phong", {"ks=1", "e=20"});
   const Vec3<double> high = in_plane(degrees(-20)), low = in_plane(degrees(70));
   EXPECT_NEAR(f(b, low, high) / f(b, high, low), std::cos(degrees(20)) / std::cos(degrees(70)), 1e-12);
-  EXPECT_NEAR(albedo_at(b, 0), 2 * kPi / 21, 1e-8);
-  EXPECT_NEAR(albedo_at(b, 85), 0.195597, 1e-6);  // a third of the lobe is below the horizon
-  EXPECT_NEAR(albedo_at(bind("phong", {"ks=1", "e=1"}), 0), kPi, 1e-7);
-  EXPECT_NEAR(albedo_at(bind("phong", {"ks=1", "e=10000"}), 0), 2 * kPi / 10001, 1e-8);
+  EXPECT_NEAR(albedo_at_degrees(b, 0), 2 * kPi / 21, 1e-8);
+  EXPECT_NEAR(albedo_at_degrees(b, 85), 0.195597, 1e-6);  // a third of the lobe is below the horizon
+  EXPECT_NEAR(albedo_at_degrees(bind("phong", {"ks=1", "e=1"}), 0), kPi, 1e-7);
+  EXPECT_NEAR(albedo_at_degrees(bind("phong", {"ks=1", "e=10000"}), 0), 2 * kPi / 10001, 1e-8);
 }
 
 TEST(Phong, LobesLeaveBlackPatches) {
@@ -65,9 +65,10 @@ TEST(Phong, LobesLeaveBlackPatches) {
 TEST(ModifiedPhong, DarkensWithTheCosine) {
   const measure::BoundModel wide = bind("modified_phong", {"ks=1", "e=20"}),
                             narrow = bind("modified_phong", {"ks=1", "e=1e8"});
-  EXPECT_NEAR(albedo_at(wide, 0), 1, 1e-8);
-  EXPECT_NEAR(albedo_at(wide, 85), 0.138293, 1e-6);
-  for (const double angle : {0., 60., 85.}) EXPECT_NEAR(albedo_at(narrow, angle), std::cos(degrees(angle)), 1e-6);
+  EXPECT_NEAR(albedo_at_degrees(wide, 0), 1, 1e-8);
+  EXPECT_NEAR(albedo_at_degrees(wide, 85), 0.138293, 1e-6);
+  for (const double angle : {0., 60., 85.})
+    EXPECT_NEAR(albedo_at_degrees(narrow, angle), std::cos(degrees(angle)), 1e-6);
 }
 
 TEST(MaxPhong, HasAHighlightOfOneBrightnessAndAnEdge) {
@@ -75,9 +76,9 @@ TEST(MaxPhong, HasAHighlightOfOneBrightnessAndAnEdge) {
   for (const double angle : {0., 45., 85.})
     EXPECT_NEAR(f(b, in_plane(degrees(-angle)), in_plane(degrees(angle))) * std::cos(degrees(angle)), 21 / (2 * kPi),
                 1e-12);
-  EXPECT_NEAR(albedo_at(b, 0), 21. / 22, 1e-8);
-  EXPECT_NEAR(albedo_at(b, 85), 0.576011, 1e-6);
-  EXPECT_NEAR(albedo_at(bind("max_phong", {"ks=1", "e=10000"}), 85), 0.954356, 1e-6);
+  EXPECT_NEAR(albedo_at_degrees(b, 0), 21. / 22, 1e-8);
+  EXPECT_NEAR(albedo_at_degrees(b, 85), 0.576011, 1e-6);
+  EXPECT_NEAR(albedo_at_degrees(bind("max_phong", {"ks=1", "e=10000"}), 85), 0.954356, 1e-6);
   // d/d theta_i of 1 / max(): 0 on the side where wo is higher, tan theta on the other.
   EXPECT_NEAR(slope_jump(b, degrees(-50), in_plane(degrees(50))), std::tan(degrees(50)), 1e-3);
   EXPECT_LT(slope_jump(bind("modified_phong", {"ks=1", "e=20"}), degrees(-50), in_plane(degrees(50))), 1e-3);
@@ -102,9 +103,9 @@ TEST(Cavities, HaveAnEdgeWhereFacetsBeginToBlock) {
 }
 
 TEST(Cavities, LoseLittleAndGainNothing) {
-  EXPECT_NEAR(albedo_at(bind("blinn", {"ks=1", "e=50"}), 60), 0.966078, 1e-6);
-  EXPECT_NEAR(albedo_at(bind("cook_torrance", {"f0=1", "m=0.3"}), 60), 0.924766, 1e-6);
-  EXPECT_NEAR(albedo_at(bind("cook_torrance", {"f0=1", "m=0.3"}), 85), 0.970237, 1e-6);
+  EXPECT_NEAR(albedo_at_degrees(bind("blinn", {"ks=1", "e=50"}), 60), 0.966078, 1e-6);
+  EXPECT_NEAR(albedo_at_degrees(bind("cook_torrance", {"f0=1", "m=0.3"}), 60), 0.924766, 1e-6);
+  EXPECT_NEAR(albedo_at_degrees(bind("cook_torrance", {"f0=1", "m=0.3"}), 85), 0.970237, 1e-6);
 }
 
 TEST(Ward, OnlyTheBoundedNormalisationKeepsWithinOne) {

@@ -13,7 +13,7 @@ using ::testing::HasSubstr;
 
 constexpr ExprType kReal = ExprType::Real, kColor = ExprType::Color;
 
-std::string function_of(const Expr& value, const std::vector<std::string>& names) {
+std::string printed_glsl(const Expr& value, const std::vector<std::string>& names) {
   Program program;
   program.output("y", value);
   std::vector<GlslArgument> arguments;
@@ -24,29 +24,29 @@ std::string function_of(const Expr& value, const std::vector<std::string>& names
 
 TEST(Glsl, NumbersAreFloats) {
   Recorder recorder;
-  EXPECT_EQ(function_of(Expr::input("x") * Expr(2) + sqrt(Expr(2.0)), {"x"}),
+  EXPECT_EQ(printed_glsl(Expr::input("x") * Expr(2) + sqrt(Expr(2.0)), {"x"}),
             "float f(float x) {\n    return x * 2.0 + 1.4142135;\n}\n");
-  EXPECT_THROW(function_of(Expr::input("x") * Expr(1e300), {"x"}), ExprError);
+  EXPECT_THROW(printed_glsl(Expr::input("x") * Expr(1e300), {"x"}), ExprError);
 }
 
 TEST(Glsl, GroupingSurvives) {
   Recorder recorder;
   const Expr a = Expr::input("a"), b = Expr::input("b"), c = Expr::input("c");
-  EXPECT_THAT(function_of(a - (b - c) / (a * (b / c)), {"a", "b", "c"}), HasSubstr("a - (b - c) / (a * (b / c))"));
-  EXPECT_THAT(function_of(select((a < b || c < b) && !(b <= c), -(a + b), c), {"a", "b", "c"}),
+  EXPECT_THAT(printed_glsl(a - (b - c) / (a * (b / c)), {"a", "b", "c"}), HasSubstr("a - (b - c) / (a * (b / c))"));
+  EXPECT_THAT(printed_glsl(select((a < b || c < b) && !(b <= c), -(a + b), c), {"a", "b", "c"}),
               HasSubstr("brdfc_select((a < b || c < b) && !(b <= c), -(a + b), c)"));
   // "--" would be a decrement.
-  EXPECT_THAT(function_of(a - (-b) * Expr(-2), {"a", "b"}), ::testing::Not(HasSubstr("--")));
+  EXPECT_THAT(printed_glsl(a - (-b) * Expr(-2), {"a", "b"}), ::testing::Not(HasSubstr("--")));
 }
 
 TEST(Glsl, AnIterationStaysALoopOfTheStepsOfAFloat) {
   Recorder recorder;
   const Expr x = Expr::input("x");
-  EXPECT_EQ(function_of(iterate(newton_steps<Expr>(), std::array<Expr, 1>{x},
-                                [&](const std::array<Expr, 1>& s) {
-                                  return std::array<Expr, 1>{s[0] - (s[0] * s[0] - x) / (s[0] + s[0])};
-                                })[0],
-                        {"x"}),
+  EXPECT_EQ(printed_glsl(iterate(newton_steps<Expr>(), std::array<Expr, 1>{x},
+                                 [&](const std::array<Expr, 1>& s) {
+                                   return std::array<Expr, 1>{s[0] - (s[0] * s[0] - x) / (s[0] + s[0])};
+                                 })[0],
+                         {"x"}),
             "float f(float x) {\n    float x0 = x;\n    for (int i = 0; i < 10; i++) {\n"
             "        float next0 = x0 - (x0 * x0 - x) / (x0 + x0);\n        x0 = next0;\n    }\n    return x0;\n}\n");
 }
@@ -84,10 +84,10 @@ TEST(Glsl, WordsOfGlslAreNoNames) {
   Recorder recorder;
   const Expr x = Expr::input("x");
   const Expr half = named("half", x * x), table = named("table_t", exp(half) + half);
-  EXPECT_EQ(function_of(table * half, {"x"}),
+  EXPECT_EQ(printed_glsl(table * half, {"x"}),
             "float f(float x) {\n    float half_1 = x * x;\n    float model_table_t = brdfc_exp(half_1) + half_1;\n"
             "    return model_table_t * half_1;\n}\n");
-  EXPECT_EQ(function_of(Expr::input("sample"), {"sample"}), "float f(float sample_) {\n    return sample_;\n}\n");
+  EXPECT_EQ(printed_glsl(Expr::input("sample"), {"sample"}), "float f(float sample_) {\n    return sample_;\n}\n");
   for (const char* word : {"vec3", "gl_Position", "a__b", "brdfc_exp"}) EXPECT_TRUE(is_glsl_word(word)) << word;
 }
 

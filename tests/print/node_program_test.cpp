@@ -17,19 +17,19 @@
 namespace brdfc::print {
 namespace {
 
-using Value = std::array<float, 3>;
-using Values = std::map<std::string, Value>;
+using NodeValue = std::array<float, 3>;
+using NodeValues = std::map<std::string, NodeValue>;
 
 /// One operation, as in kernel/svm/math_util.h and mix.h.
-Value compute(const NodeOperation& o, const std::vector<Value>& a) {
-  const auto each = [&](const auto& f) { return Value{f(0), f(1), f(2)}; };
-  const auto grey = [](float x) { return Value{x, x, x}; };
+NodeValue compute(const NodeOperation& o, const std::vector<NodeValue>& a) {
+  const auto each = [&](const auto& f) { return NodeValue{f(0), f(1), f(2)}; };
+  const auto grey = [](float x) { return NodeValue{x, x, x}; };
   const std::string kind = o.kind.starts_with("V_") ? o.kind.substr(2) : o.kind;
   if (kind == "COMBINE") return {a[0][0], a[1][0], a[2][0]};
   if (kind == "X" || kind == "Y" || kind == "Z") return grey(a[0][std::size_t(kind[0] - 'X')]);
   if (kind == "LOOKUP") {
     std::vector<float> at;
-    for (const Value& x : a) at.push_back(x[0]);
+    for (const NodeValue& x : a) at.push_back(x[0]);
     return grey(lookup(o.table, at));
   }
   if (kind == "DOT_PRODUCT") return grey(a[0][0] * a[1][0] + a[0][1] * a[1][1] + a[0][2] * a[1][2]);
@@ -57,19 +57,19 @@ Value compute(const NodeOperation& o, const std::vector<Value>& a) {
   });
 }
 
-Values run(const NodeProgram& program, const Values& inputs) {
-  std::vector<Value> results;
+NodeValues run(const NodeProgram& program, const NodeValues& inputs) {
+  std::vector<NodeValue> results;
   const auto value = [&](const NodeOperand& o) {
     if (o.result >= 0) return results.at(std::size_t(o.result));
     if (!o.input.empty()) return inputs.at(o.input);
-    return Value{float(o.value[0]), float(o.value[1]), float(o.value[2])};
+    return NodeValue{float(o.value[0]), float(o.value[1]), float(o.value[2])};
   };
   for (const NodeOperation& o : program.operations) {
-    std::vector<Value> arguments;
+    std::vector<NodeValue> arguments;
     for (const NodeOperand& a : o.operands) arguments.push_back(value(a));
     results.push_back(compute(o, arguments));
   }
-  Values out;
+  NodeValues out;
   for (const auto& [name, o] : program.outputs) out[name] = value(o);
   return out;
 }
@@ -80,7 +80,7 @@ NodeProgram program_of(const Expr& value) {
   return node_program(program);
 }
 float run_one(const NodeProgram& program, const std::map<std::string, float>& inputs) {
-  Values values;
+  NodeValues values;
   for (const auto& [name, x] : inputs) values[name] = {x, x, x};
   return run(program, values).at("y")[0];
 }
@@ -133,7 +133,7 @@ TEST(NodeProgram, WhatDoesNotVaryIsComputedOnce) {
   program.output("y", exp(a * a) * x + sqrt(a));
   const NodePrograms made = node_programs(program, {"x"}, "kept_");
   EXPECT_EQ(made.each.operations.size(), 1u);
-  Values values = run(made.once, {{"a", {2, 2, 2}}});
+  NodeValues values = run(made.once, {{"a", {2, 2, 2}}});
   EXPECT_EQ(values.size(), 2u);
   values["x"] = {3, 3, 3};
   EXPECT_FLOAT_EQ(run(made.each, values).at("y")[0], std::exp(4.f) * 3 + std::sqrt(2.f));
@@ -180,11 +180,11 @@ TEST_P(NodesOfModels, AreTheRecording) {
       set_input(inputs, "wi", in);
       for (const char* u : {"u_0", "u_1", "u_2"}) set_input(inputs, u, unit(random));
       const auto expected = program.run(inputs);
-      Values given(inputs.begin(), inputs.end());
+      NodeValues given(inputs.begin(), inputs.end());
       for (const char* name : {"wi", "wo"})
         for (std::size_t c = 0; c < 3; ++c) given[name][c] = given.at(std::string(name) + "_" + "xyz"[c])[0];
       given.merge(run(nodes.once, given));
-      Values found = run(nodes.each, given);
+      NodeValues found = run(nodes.each, given);
       for (std::size_t c = 0; c < 3; ++c) {
         const float x = found.at("drawn")[c];
         found[std::string("drawn_") + "xyz"[c]] = {x, x, x};

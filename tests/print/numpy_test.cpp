@@ -12,7 +12,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-std::string function_of(const Expr& value, const std::vector<std::string>& arguments) {
+std::string printed_numpy(const Expr& value, const std::vector<std::string>& arguments) {
   Program program;
   program.output("y", value);
   Tables tables;
@@ -21,15 +21,15 @@ std::string function_of(const Expr& value, const std::vector<std::string>& argum
 
 TEST(NumPy, ConstantsKeepTheDigitsOfADouble) {
   Recorder recorder(Precision::Double);
-  EXPECT_EQ(function_of(Expr::input("x") * sqrt(Expr(2.0)), {"x"}),
+  EXPECT_EQ(printed_numpy(Expr::input("x") * sqrt(Expr(2.0)), {"x"}),
             "def f(np, x):\n    return x * 1.4142135623730951\n");
 }
 
 TEST(NumPy, GroupingSurvives) {
   Recorder recorder(Precision::Double);
   const Expr a = Expr::input("a"), b = Expr::input("b"), c = Expr::input("c");
-  EXPECT_THAT(function_of(a - (b - c) / (a * (b / c)), {"a", "b", "c"}), HasSubstr("a - (b - c) / (a * (b / c))"));
-  EXPECT_THAT(function_of(select(a < b && !(b <= c), -(a + b), c), {"a", "b", "c"}),
+  EXPECT_THAT(printed_numpy(a - (b - c) / (a * (b / c)), {"a", "b", "c"}), HasSubstr("a - (b - c) / (a * (b / c))"));
+  EXPECT_THAT(printed_numpy(select(a < b && !(b <= c), -(a + b), c), {"a", "b", "c"}),
               HasSubstr("np.where((a < b) & np.logical_not(b <= c), -(a + b), c)"));
 }
 
@@ -37,11 +37,11 @@ TEST(NumPy, AnIterationStaysALoopOfTheStepsOfItsPrecision) {
   const auto text = [](Precision precision) {
     Recorder recorder(precision);
     const Expr x = Expr::input("x");
-    return function_of(iterate(newton_steps<Expr>(), std::array<Expr, 1>{x},
-                               [&](const std::array<Expr, 1>& s) {
-                                 return std::array<Expr, 1>{s[0] - (s[0] * s[0] - x) / (s[0] + s[0])};
-                               })[0],
-                       {"x"});
+    return printed_numpy(iterate(newton_steps<Expr>(), std::array<Expr, 1>{x},
+                                 [&](const std::array<Expr, 1>& s) {
+                                   return std::array<Expr, 1>{s[0] - (s[0] * s[0] - x) / (s[0] + s[0])};
+                                 })[0],
+                         {"x"});
   };
   EXPECT_EQ(text(Precision::Double),
             "def f(np, x):\n    x0 = x\n    for i in range(24):\n        next0 = x0 - (x0 * x0 - x) / (x0 + x0)\n"
@@ -70,10 +70,10 @@ TEST(NumPy, WordsOfPythonAreNoNames) {
   Recorder recorder(Precision::Double);
   const Expr x = Expr::input("x");
   const Expr lambda = named("lambda", x * x), np = named("np", exp(lambda)), table = named("table_t", np + lambda);
-  EXPECT_EQ(function_of(table * np, {"x"}),
+  EXPECT_EQ(printed_numpy(table * np, {"x"}),
             "def f(np, x):\n    lambda_1 = x * x\n    np_1 = np.exp(lambda_1)\n    model_table_t = np_1 + lambda_1\n"
             "    return model_table_t * np_1\n");
-  EXPECT_THROW(function_of(x, {"x", "lambda"}), ExprError);
+  EXPECT_THROW(printed_numpy(x, {"x", "lambda"}), ExprError);
 }
 
 TEST(NumPy, TextIsEscapedAndBroken) {

@@ -26,15 +26,15 @@ Image picture(const Scene& s, int width, int spp) {
   return render(s, options).rendering.mean;
 }
 
-using Point = std::array<double, 2>;
+using Point2 = std::array<double, 2>;
 
 /// A pixel's centre relative to the picture's, in units of the picture's height, x to the right and y upwards.
-Point place(const Image& image, int x, int y) {
+Point2 place(const Image& image, int x, int y) {
   return {(x + 0.5 - image.width / 2.0) / image.height, (image.height / 2.0 - y - 0.5) / image.height};
 }
 
 /// Mean luminance of the selected pixels.
-double mean(const Image& image, const std::function<bool(const Point&)>& wanted) {
+double mean(const Image& image, const std::function<bool(const Point2&)>& wanted) {
   double sum = 0;
   int count = 0;
   for (int y = 0; y < image.height; ++y)
@@ -48,8 +48,8 @@ double mean(const Image& image, const std::function<bool(const Point&)>& wanted)
 }
 
 /// Selects pixels between two distances from `centre`, in units of `radius`.
-std::function<bool(const Point&)> ring(const Point& centre, double radius, double from, double to) {
-  return [=](const Point& p) {
+std::function<bool(const Point2&)> ring(const Point2& centre, double radius, double from, double to) {
+  return [=](const Point2& p) {
     const double r = hypot(p[0] - centre[0], p[1] - centre[1]) / radius;
     return r >= from && r < to;
   };
@@ -60,7 +60,7 @@ std::function<bool(const Point&)> ring(const Point& centre, double radius, doubl
 TEST(Figures, LostRaysDarkenTheRimOfASphereAndTurnedRaysDoNot) {
   // The sphere of radius 1 is in a picture 2.4 high. At 0.98 of its radius theta is 78.5 degrees, and (1 + cos theta) /
   // 2 of a cosine lobe about the mirror direction is above the surface.
-  const Point middle{0, 0};
+  const Point2 middle{0, 0};
   const auto at_rim = ring(middle, 1 / 2.4, 0.97, 0.99), inside = ring(middle, 1 / 2.4, 0, 0.2);
   const Image lost = picture(scene("gl-fig5"), 192, 64);
   EXPECT_NEAR(mean(lost, at_rim) / mean(lost, inside), (1 + sqrt(1 - 0.98 * 0.98)) / 2, 0.02);
@@ -97,7 +97,7 @@ TEST(Figures, OneSampleAPixelMakesAMirrorOfAMatteSphere) {
 /// Radziszewski and Alda: a lossless model is invisible in a uniform world.
 TEST(Figures, ALosslessSphereVanishes) {
   const Image image = picture(scene("ra-vanish"), 96, 64);
-  const auto all = [](const Point&) { return true; };
+  const auto all = [](const Point2&) { return true; };
   EXPECT_NEAR(mean(image, all), 0.5, 1e-4);
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) ASSERT_NEAR(image.pixel(x, y)[1], 0.5, 0.02) << x << ' ' << y;
@@ -227,7 +227,7 @@ TEST(Figures, RivalsFailVisiblyInAFurnace) {
   const Image image = picture(scene("furnace"), 250, 64);
   // Balls of radius 1 at a distance of 2.2 in a height of 4.4.
   const auto rim = [&](int column, int row) {
-    const Point at{(column - 2) * 2.2 / 4.4, (row == 0 ? 1.1 : -1.1) / 4.4};
+    const Point2 at{(column - 2) * 2.2 / 4.4, (row == 0 ? 1.1 : -1.1) / 4.4};
     return mean(image, ring(at, 1 / 4.4, 0.9, 0.98)) / 0.45;
   };
   for (const int kept : {0, 1, 2}) EXPECT_NEAR(rim(kept, 0), 1, 0.01) << kept;

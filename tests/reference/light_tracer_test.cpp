@@ -16,7 +16,7 @@
 namespace brdfc::reference {
 namespace {
 
-constexpr double kSigmas = 5;
+constexpr double kSigmasOfLight = 5;
 
 Rendering picture(const Scene& s, Origin origin, int width, int spp) {
   RenderOptions o;
@@ -28,13 +28,13 @@ Rendering picture(const Scene& s, Origin origin, int width, int spp) {
   return render(s, o).rendering;
 }
 
-struct Estimate {
+struct LightEstimate {
   double mean = 0, error = 0;
 };
 
 /// Mean of the selected pixels' green channel, and its standard error. Particles reach many pixels, but no two pixels
 /// share much of their noise.
-template <class Wanted> Estimate mean(const Rendering& r, const Wanted& wanted) {
+template <class Wanted> LightEstimate mean(const Rendering& r, const Wanted& wanted) {
   double sum = 0, variance = 0;
   int count = 0;
   for (int y = 0; y < r.mean.height; ++y)
@@ -49,7 +49,7 @@ template <class Wanted> Estimate mean(const Rendering& r, const Wanted& wanted) 
 }
 
 /// The difference in standard errors; 0 if equal, which it may be if there is no noise.
-double sigmas(const Estimate& a, const Estimate& b) {
+double sigmas(const LightEstimate& a, const LightEstimate& b) {
   if (a.mean == b.mean) return 0;
   return std::abs(a.mean - b.mean) / std::sqrt(a.error * a.error + b.error * b.error);
 }
@@ -126,15 +126,15 @@ TEST(LightTracer, EveryLampGivesThePictureOfThePathTracer) {
       s.environment.color = Rgb<double>(0.2, 0.5, 0.8);
     }
     const Rendering path = picture(s, Origin::Camera, 16, 512), particles = picture(s, Origin::Lamps, 16, 2048);
-    const Estimate a = mean(path, everywhere), b = mean(particles, everywhere);
+    const LightEstimate a = mean(path, everywhere), b = mean(particles, everywhere);
     EXPECT_LT(a.error + b.error, 0.02 * a.mean) << c.name << ": the test has no power";
-    EXPECT_LT(sigmas(a, b), kSigmas) << c.name << ' ' << a.mean << ' ' << b.mean;
+    EXPECT_LT(sigmas(a, b), kSigmasOfLight) << c.name << ' ' << a.mean << ' ' << b.mean;
     // Rows and columns, in which a wrong falloff or position would be visible.
     for (int i = 0; i < 16; ++i) {
       const auto row = [&](int, int y) { return y == i; };
       const auto column = [&](int x, int) { return x == i; };
-      EXPECT_LT(sigmas(mean(path, row), mean(particles, row)), kSigmas) << c.name << ", row " << i;
-      EXPECT_LT(sigmas(mean(path, column), mean(particles, column)), kSigmas) << c.name << ", column " << i;
+      EXPECT_LT(sigmas(mean(path, row), mean(particles, row)), kSigmasOfLight) << c.name << ", row " << i;
+      EXPECT_LT(sigmas(mean(path, column), mean(particles, column)), kSigmasOfLight) << c.name << ", column " << i;
     }
   }
 }
@@ -160,16 +160,16 @@ TEST(LightTracer, SwappedDirectionsShowWhichModelsAreNotReciprocal) {
     // Averaged over the whole ball, both directions agree because of its symmetry: compares the rim on the light's
     // side.
     const auto lit = [](int x, int) { return x < 8; };
-    const Estimate a = mean(picture(s, Origin::Camera, 32, 256), lit);
-    const Estimate b = mean(picture(s, Origin::Lamps, 32, 1024), lit);
-    const Estimate w = mean(picture(s, Origin::LampsSwapped, 32, 1024), lit);
+    const LightEstimate a = mean(picture(s, Origin::Camera, 32, 256), lit);
+    const LightEstimate b = mean(picture(s, Origin::Lamps, 32, 1024), lit);
+    const LightEstimate w = mean(picture(s, Origin::LampsSwapped, 32, 1024), lit);
     EXPECT_LT(a.error + b.error, 0.015 * a.mean) << o.name << ": the test has no power";
-    EXPECT_LT(sigmas(a, b), kSigmas) << o.name << ' ' << a.mean << ' ' << b.mean;
+    EXPECT_LT(sigmas(a, b), kSigmasOfLight) << o.name << ' ' << a.mean << ' ' << b.mean;
     std::printf("%-20s camera %.5f  lamps %.5f  swapped %.5f\n", o.name.c_str(), a.mean, b.mean, w.mean);
     if (s.materials[std::size_t(o.material)].model->info().properties.reciprocal) {
-      EXPECT_LT(sigmas(a, w), kSigmas) << o.name << ' ' << a.mean << ' ' << w.mean;
+      EXPECT_LT(sigmas(a, w), kSigmasOfLight) << o.name << ' ' << a.mean << ' ' << w.mean;
     } else {
-      EXPECT_GT(sigmas(a, w), kSigmas) << o.name << ' ' << a.mean << ' ' << w.mean;
+      EXPECT_GT(sigmas(a, w), kSigmasOfLight) << o.name << ' ' << a.mean << ' ' << w.mean;
       EXPECT_GT(std::abs(w.mean / a.mean - 1), 0.05) << o.name << ' ' << a.mean << ' ' << w.mean;
     }
     ++tried;

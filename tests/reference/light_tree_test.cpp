@@ -24,7 +24,7 @@ using Vector = Vec3<double>;
 /// Use the tree for any number of lamps, or never.
 constexpr std::size_t kAlways = 0, kNever = std::numeric_limits<std::size_t>::max();
 
-Vector direction(Random& random) { return sample_cone({0, 0, 1}, 2, random.uniform(), random.uniform()); }
+Vector any_direction(Random& random) { return sample_cone({0, 0, 1}, 2, random.uniform(), random.uniform()); }
 
 /// Lamps of all kinds in a box of this half size about the origin: points, spheres, flat ones, thin ones, suns, some at
 /// the same position; with powers over three decades. `least`: added to all sizes, in units of the half size.
@@ -37,7 +37,7 @@ std::vector<Light> lamps_of_all_kinds(int count, double half, std::uint64_t seed
     const double power = std::pow(10.0, 3 * random.uniform());
     l.position = Vector{2 * random.uniform() - 1, 2 * random.uniform() - 1, 2 * random.uniform() - 1} * half;
     if (kind == 3 && !lamps.empty()) l.position = lamps.back().position;
-    l.direction = direction(random);
+    l.direction = any_direction(random);
     if (kind < 9) {
       l.kind = Light::Kind::Point;
       l.radius = kind < 4 ? 0 : half * (least + 0.2 * random.uniform() * random.uniform());
@@ -73,7 +73,7 @@ template <class Use> void for_places(double half, int count, const Use& use) {
   Random random(7, 7, 7);
   for (int i = 0; i < count; ++i) {
     const double away = half * std::array{0.3, 1.3, 20.0}[std::size_t(i % 3)];
-    use(direction(random) * away, direction(random));
+    use(any_direction(random) * away, any_direction(random));
   }
 }
 
@@ -103,9 +103,9 @@ TEST(LightTree, ChancesAreThoseWithWhichLampsAreChosen) {
     for (int i = 0; i < count; ++i) {
       LampBounds b;
       b.far = i % 10 == 9;
-      b.centre = b.far ? direction(random) : direction(random) * (5 * random.uniform());
+      b.centre = b.far ? any_direction(random) : any_direction(random) * (5 * random.uniform());
       b.radius = i % 3 ? 0.5 * random.uniform() * random.uniform() : 0;
-      b.direction = direction(random);
+      b.direction = any_direction(random);
       b.cos_cone = i % 2 ? 1 : -1;
       b.power = std::pow(10.0, 3 * random.uniform()) * (b.far ? 0.1 : 1);
       lamps.push_back(b);
@@ -171,7 +171,8 @@ TEST(LightTree, RaysMeetTheSameLamps) {
     Rays rays;
     Numbers distance;
     for (std::size_t k = 0; k < kBlock; ++k) {
-      const Vector from = direction(random) * (k % 5 ? 8.0 : 3000.0), to = direction(random) * (6 * random.uniform());
+      const Vector from = any_direction(random) * (k % 5 ? 8.0 : 3000.0),
+                   to = any_direction(random) * (6 * random.uniform());
       rays.origin.set(k, from);
       rays.direction.set(k, normalize(to - from));
       distance[k] = k % 2 ? kInfinity : length(to - from);

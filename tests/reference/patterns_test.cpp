@@ -15,19 +15,19 @@
 namespace brdfc::reference {
 namespace {
 
-using Point = std::array<double, 2>;
+using Point2 = std::array<double, 2>;
 
-std::vector<Point> points(Pattern pattern, int count, std::uint64_t key) {
+std::vector<Point2> points(Pattern pattern, int count, std::uint64_t key) {
   const PatternPoints p(pattern, count);
-  std::vector<Point> out;
+  std::vector<Point2> out;
   for (int i = 0; i < count; ++i) out.push_back(p.point(i, key));
   return out;
 }
 
 /// The cells of a grid that contain points.
-std::set<std::pair<int, int>> cells(const std::vector<Point>& points, int columns, int rows) {
+std::set<std::pair<int, int>> cells(const std::vector<Point2>& points, int columns, int rows) {
   std::set<std::pair<int, int>> out;
-  for (const Point& p : points) {
+  for (const Point2& p : points) {
     EXPECT_TRUE(p[0] >= 0 && p[0] < 1 && p[1] >= 0 && p[1] < 1) << p[0] << ' ' << p[1];
     out.insert({int(p[0] * columns), int(p[1] * rows)});
   }
@@ -76,7 +76,7 @@ TEST(Patterns, CellsAreAsSquareAsTheCountAllows) {
 
 TEST(Patterns, RegularPointsAreTheMiddlesOfTheCells) {
   EXPECT_THAT(points(Pattern::Regular, 4, 5),
-              testing::ElementsAre(Point{.25, .25}, Point{.75, .25}, Point{.25, .75}, Point{.75, .75}));
+              testing::ElementsAre(Point2{.25, .25}, Point2{.75, .25}, Point2{.25, .75}, Point2{.75, .75}));
 }
 
 TEST(Patterns, JitteredHasOneInEachCell) {
@@ -122,7 +122,7 @@ TEST(Patterns, DimensionsOfAPathKnowNothingOfEachOther) {
   const PatternPoints p(Pattern::MultiJittered, 16);
   double sum = 0;
   for (std::uint64_t pixel = 0; pixel < 2000; ++pixel) {
-    std::vector<Point> first;
+    std::vector<Point2> first;
     for (int s = 0; s < 16; ++s) {
       PathSampler sampler(p, 1, pixel, s);
       first.push_back(sampler.two(0));
@@ -144,7 +144,7 @@ double variance(Pattern pattern, double e, const Environment& world) {
     for (std::uint64_t key = 0; key < kPatterns; ++key) {
       double mean = 0;
       for (int i = 0; i < 64; ++i) {
-        const Point u = p.point(i, key * kLobes + std::uint64_t(k));
+        const Point2 u = p.point(i, key * kLobes + std::uint64_t(k));
         const double cosine = std::pow(1 - u[1], 1 / (e + 1));
         mean += luminance(world.radiance(about_axis(r, direction(cosine, 2 * kPi * u[0])))) / 64;
       }

@@ -34,7 +34,7 @@ Camera camera(const Vector& position, const Vector& target, bool orthographic, d
   return c;
 }
 
-Object object(Mesh mesh, const Vector& at = {0, 0, 0}, int material = 0) {
+Object placed(Mesh mesh, const Vector& at = {0, 0, 0}, int material = 0) {
   Object o;
   o.mesh = std::make_shared<const Mesh>(std::move(mesh));
   o.transform.translation = at;
@@ -102,7 +102,7 @@ TEST(Views, HoldEveryPointAndLittleMore) {
     const bool orthographic = i % 2 == 1;
     Scene s = scene(camera({3 * uniform(rng), 3 * uniform(rng), 2 + uniform(rng)}, {0.3 * uniform(rng), 0, 0},
                            orthographic, orthographic ? 1.5 : 0.5),
-                    {object(mesh)});
+                    {placed(mesh)});
     s.settings.width = 320;
     const Cosines bound = seen_cosines(s)[0], points = at_points(s, mesh, rng);
     if (points.low > points.high) continue;
@@ -117,7 +117,7 @@ TEST(Views, HoldEveryPointAndLittleMore) {
 
 TEST(Views, AreAllWhereScatteredRaysCanComeBack) {
   const Camera above = camera({1, 2, 3}, {0, 0, 0}, true, 2);
-  const Object floor = object(make_quad(2, 2)), box = object(make_box({1, 1, 1}));
+  const Object floor = placed(make_quad(2, 2)), box = placed(make_box({1, 1, 1}));
   const double cosine = 3 / std::sqrt(14);
   for (const int bounces : {0, 4}) {
     const Cosines seen = seen_cosines(scene(above, {floor}, bounces))[0];
@@ -129,8 +129,8 @@ TEST(Views, AreAllWhereScatteredRaysCanComeBack) {
   }
   const auto all = [](const Scene& s) { return seen_cosines(s)[0].all(); };
   EXPECT_TRUE(all(scene(above, {floor}, 0, "glass"))) << "Cycles lets rays pass that it does not count";
-  EXPECT_TRUE(all(scene(above, {box, object(make_quad(4, 4), {0, 0, -0.5})}, 1)));
-  EXPECT_TRUE(all(scene(above, {box, object(make_box({1, 1, 1}), {3, 0, 0})}, 1)));
+  EXPECT_TRUE(all(scene(above, {box, placed(make_quad(4, 4), {0, 0, -0.5})}, 1)));
+  EXPECT_TRUE(all(scene(above, {box, placed(make_box({1, 1, 1}), {3, 0, 0})}, 1)));
   EXPECT_TRUE(all(scene(camera({0, 0, 0}, {1, 0, 0}, false, 1), {box}, 1))) << "from inside";
   EXPECT_TRUE(all(scene(camera({1, 2, -3}, {9, 9, -9}, false, 0.1), {floor}, 0))) << "out of sight";
 
@@ -138,20 +138,20 @@ TEST(Views, AreAllWhereScatteredRaysCanComeBack) {
   Mesh roof;
   roof.vertices = {{-1, 0, 0}, {0, -1, 1}, {0, 1, 1}, {1, 0, 0}};
   roof.triangles = {{0, 1, 2}, {3, 2, 1}};
-  EXPECT_FALSE(all(scene(camera({0, 0, 5}, {0, 0, 0}, false, 1), {object(roof)}, 1)));
-  EXPECT_TRUE(all(scene(camera({0, 0, -5}, {0, 0, 0}, false, 1), {object(roof)}, 1)));
+  EXPECT_FALSE(all(scene(camera({0, 0, 5}, {0, 0, 0}, false, 1), {placed(roof)}, 1)));
+  EXPECT_TRUE(all(scene(camera({0, 0, -5}, {0, 0, 0}, false, 1), {placed(roof)}, 1)));
   // A box without a lid shows its inner sides.
   Mesh open = make_box({1, 1, 1});
   std::erase_if(open.triangles, [&](const auto& t) {
     return std::ranges::all_of(t, [&](int v) { return open.vertices[std::size_t(v)][2] > 0; });
   });
   ASSERT_EQ(open.triangles.size(), 10u);
-  EXPECT_TRUE(all(scene(above, {object(open)}, 1)));
+  EXPECT_TRUE(all(scene(above, {placed(open)}, 1)));
 }
 
 TEST(Views, AreThoseOfEachMaterial) {
   const auto seen = seen_cosines(scene(camera({0, 0, 5}, {0, 0, 0}, false, 0.9),
-                                       {object(make_quad(1, 1)), object(make_quad(1, 1), {3, 0, 0}, 1)}, 2));
+                                       {placed(make_quad(1, 1)), placed(make_quad(1, 1), {3, 0, 0}, 1)}, 2));
   EXPECT_GT(seen[0].low, 0.98);
   EXPECT_NEAR(seen[0].high, 1, 1e-4);
   EXPECT_NEAR(seen[1].low, 5 / std::hypot(5, 3.5, 0.5), 1e-3);
