@@ -36,12 +36,12 @@ void add_sample_command(CLI::App& app) {
     std::string pattern = "random";
   };
   auto o = std::make_shared<Options>();
-  CLI::App* cmd =
-      app.add_subcommand("sample",
-                         "Directions sampled from the model, with their weights f cos / pdf and pdfs per solid angle.\n"
-                         "A sample with pdf 0 is lost (below the horizon); its weight is 0, and its direction (0, 0, 1) if wo is below.\n"
-                         "stdin:  CSV with header wo_x,wo_y,wo_z,u1,u2,u3 (0 <= u < 1), unless --count is given\n"
-                         "stdout: CSV with header wi_x,wi_y,wi_z,weight_r,weight_g,weight_b,pdf");
+  CLI::App* cmd = app.add_subcommand(
+      "sample",
+      "Directions sampled from the model, with their weights f cos / pdf and pdfs per solid angle.\n"
+      "A sample with pdf 0 is lost (below the horizon); its weight is 0, and its direction (0, 0, 1) if wo is below.\n"
+      "stdin:  CSV with header wo_x,wo_y,wo_z,u1,u2,u3 (0 <= u < 1), unless --count is given\n"
+      "stdout: CSV with header wi_x,wi_y,wi_z,weight_r,weight_g,weight_b,pdf");
   cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
   cmd->add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
   CLI::Option* count =

@@ -3,9 +3,8 @@
 // drops closures that subtract light. So the light that a closure carries for a lamp can't be subtracted elsewhere and
 // has to be left out there.
 //
-// Lamps: one Toon closure each, constant over the lamp's cone, with a part of the model's f cos at a random point of the
-// lamp.
-// Rest: a direction drawn from the model. If it hits one of these lamps, it carries the other part of f cos.
+// Lamps: one Toon closure each, constant over the lamp's cone, with a part of the model's f cos at a random point of
+// the lamp. Rest: a direction drawn from the model. If it hits one of these lamps, it carries the other part of f cos.
 //
 // The two parts are those of multiple importance sampling (Veach and Guibas 1995, power heuristic with exponent 2). So
 // drawn directions find the highlight of a lobe that is narrow for its lamp, and the closure has the light of a lamp
@@ -146,8 +145,8 @@ template <class T> FlatPoint<T> flat_point(const LampSlot<T>& slot, const LampAx
 /// The part of f cos in one direction that the lamp's closure carries; the drawn direction carries the rest of it.
 /// `density`: pdf of drawn directions there. `emphasis`: see FlatPoint, 1 for a ball or a sun.
 template <class T> T part_of_lamp(const LampCone<T>& cone, const T& emphasis, const T& density) {
-  // The point of a rectangle has the pdf 1 / (solid_angle emphasis), and since Cycles samples all of the rectangle, only
-  // one sample in `emphasis` meets its cone.
+  // The point of a rectangle has the pdf 1 / (solid_angle emphasis), and since Cycles samples all of the rectangle,
+  // only one sample in `emphasis` meets its cone.
   return T(1) / (T(1) + sqr(density * (cone.solid_angle * sqr(emphasis))));
 }
 
@@ -178,18 +177,19 @@ template <class T> T kept(const T& weight, const T& u) {
   return select(u < chance, T(1), T(0)) / minimum(chance, T(1));
 }
 
-/// The inputs of a Toon closure that carries `value`, as f cos, over the cone: as much of it as part_of_lamp() says. For
-/// a ball or a sun it may be wider than the cone.
+/// The inputs of a Toon closure that carries `value`, as f cos, over the cone: as much of it as part_of_lamp() says.
+/// For a ball or a sun it may be wider than the cone.
 template <class T> struct ToonLobe {
   Rgb<T> color;
   T size;  ///< in units of 90 degrees, as in the node
 };
-/// `room`: the radius that it may have without covering another lamp. `emphasis`, `density`: at the point where the value
-/// is taken.
+/// `room`: the radius that it may have without covering another lamp. `emphasis`, `density`: at the point where the
+/// value is taken.
 template <class T> ToonLobe<T> toon_lobe(const LampCone<T>& cone, const T& emphasis, const T& density, const T& room,
                                          const Rgb<T>& value, const T& u) {
   constexpr double kWidened = 2e-4;
-  const T factor = emphasis * cone.whole * part_of_lamp(cone, emphasis, density), largest = max_component(value) * factor;
+  const T factor = emphasis * cone.whole * part_of_lamp(cone, emphasis, density),
+          largest = max_component(value) * factor;
   const T wide = minimum(sqrt(T(kWidened / kPi) / largest), room);
   const T chord = maximum(cone.chord, select(cone.flat > T(0.5), T(0), wide)), chord2 = chord * chord;
   const T extent = chord2 * T(kPi);

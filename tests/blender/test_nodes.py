@@ -180,7 +180,8 @@ def test_noise_under_a_rectangle(extension):
 
 def wide_rectangle(scene):
     add_lamp(
-        scene, "AREA", "Area", (2, -4, 1), (math.pi / 2, 0, 0.4), energy=300, shape="SQUARE", size=2.0
+        scene, "AREA", "Area", (2, -4, 1), (math.pi / 2, 0, 0.4), energy=300,
+        shape="SQUARE", size=2.0,
     )  # fmt: skip
 
 
