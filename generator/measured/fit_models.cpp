@@ -20,14 +20,14 @@ namespace {
 
 constexpr std::size_t kCoarse = 256, kFine = 1024, kFinal = 8192;  ///< pairs of directions
 constexpr std::size_t kCurves = 4096;                              ///< pairs for curves, which have more parameters
-constexpr int kTries = 24;          ///< places where numbers are tried before a search, for each choice
-constexpr std::size_t kStarts = 4;  ///< searches begin at the best of them
+constexpr int kTries = 24;               ///< places where numbers are tried before a search, for each choice
+constexpr std::size_t kModelStarts = 4;  ///< searches begin at the best of them
 /// A model that misplaces less than this needs no matte light.
 constexpr double kGood = 1e-3;
 /// Matte light is taken if it makes the error at least so many times smaller.
 constexpr double kWorthMatte = 0.95;
 /// Errors that differ by no more than this share, or by this part of the light, are alike.
-constexpr double kAlike = 0.05, kNegligible = 5e-4;
+constexpr double kModelsAlike = 0.05, kNegligible = 5e-4;
 /// A model with its choices made, and what is searched for.
 class Problem {
  public:
@@ -247,7 +247,7 @@ std::optional<ModelFit> fit_model(const Model& model, bool isotropic, const Pair
       }
     }
     std::ranges::stable_sort(candidates, {}, &Candidate::error);
-    if (candidates.size() > kStarts) candidates.resize(kStarts);
+    if (candidates.size() > kModelStarts) candidates.resize(kModelStarts);
     for (Candidate& c : candidates) {
       Problem& problem = problems[c.problem];
       for (const double step : {0.08, 0.01}) {
@@ -308,7 +308,7 @@ std::vector<ModelFit> fit_models(const Measurement& m, const MeasuredModel& data
   for (std::size_t i = 0; i < out.size(); ++i) {
     const auto begin = out.begin() + long(i);
     const auto end = std::find_if(begin, out.end(), [&](const ModelFit& f) {
-      return distance(f) > distance(*begin) * (1 + kAlike) + kNegligible;
+      return distance(f) > distance(*begin) * (1 + kModelsAlike) + kNegligible;
     });
     const auto simplest = std::ranges::min_element(begin, end, {}, &ModelFit::found);
     std::rotate(begin, simplest, simplest + 1);

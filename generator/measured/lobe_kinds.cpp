@@ -11,7 +11,7 @@ using enum AxisScale;
 
 enum class Data { Any, Isotropic, Anisotropic };
 
-struct Row {
+struct KindRow {
   const char* model;
   std::vector<std::string> choices;  ///< and colours that are fixed, in the syntax of parse_values()
   const char* color;
@@ -21,8 +21,8 @@ struct Row {
 };
 
 /// The ranges end where a highlight is narrower than what tables resolve, or as wide as a matte surface.
-const std::vector<Row>& rows() {
-  static const std::vector<Row> out{
+const std::vector<KindRow>& rows() {
+  static const std::vector<KindRow> out{
       {"lambert", {}, "rho", {}},
       {"oren_nayar", {"form=full"}, "rho", {{{"sigma"}, {Linear, 0.05, 0.66}, 3}}},
       {"radziszewski_alda",
@@ -92,15 +92,15 @@ std::vector<LobeKind> lobe_kinds(const std::vector<std::string>& names, bool iso
     return names.empty() || std::ranges::find(names, model) != names.end();
   };
   for (const std::string& name : names) {
-    if (std::ranges::none_of(rows(), [&](const Row& row) { return row.model == name; })) {
+    if (std::ranges::none_of(rows(), [&](const KindRow& row) { return row.model == name; })) {
       std::vector<std::string> known;
-      for (const Row& row : rows())
+      for (const KindRow& row : rows())
         if (known.empty() || known.back() != row.model) known.emplace_back(row.model);
       input_error("{} has no lobe for a sum, expected all or some of {}", name, fmt::join(known, ", "));
     }
   }
   std::vector<LobeKind> out;
-  for (const Row& row : rows()) {
+  for (const KindRow& row : rows()) {
     if (row.data == (isotropic ? Data::Anisotropic : Data::Isotropic) || !named(row.model)) continue;
     const Model& model = find_model(row.model);
     out.push_back({&model, complete(model.info(), parse_values(model.info(), row.choices)), row.color, row.numbers,

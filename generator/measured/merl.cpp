@@ -11,10 +11,10 @@ namespace brdfc::measured {
 namespace {
 
 /// Places in units of cells, along the three axes.
-struct Place {
+struct MerlPlace {
   double h, d, p;
 };
-Place place_of(const HalfDifference& a) {
+MerlPlace place_of(const HalfDifference& a) {
   const double phi_d = a.phi_d < 0 ? a.phi_d + kPi : a.phi_d;
   return {std::sqrt(std::max(a.theta_h, 0.) / (kPi / 2)) * double(kMerlThetaH),
           a.theta_d / (kPi / 2) * double(kMerlThetaD), phi_d / kPi * double(kMerlPhiD)};
@@ -47,7 +47,7 @@ class Merl final : public Table {
 
   Rgb<double> eval(const Vec3<double>& wi, const Vec3<double>& wo) const override {
     if (!(wi.z > 0 && wo.z > 0)) return Rgb<double>(0);
-    const Place at = place_of(half_difference(wi, wo));
+    const MerlPlace at = place_of(half_difference(wi, wo));
     const Between h = between(at.h, kMerlThetaH), d = between(at.d, kMerlThetaD), p = around(at.p, kMerlPhiD);
     std::array<double, 3> sum{};
     double weights = 0;
@@ -100,7 +100,7 @@ HalfDifference merl_angles(std::size_t entry) {
 }
 
 std::size_t merl_entry(const HalfDifference& a) {
-  const Place at = place_of(a);
+  const MerlPlace at = place_of(a);
   const auto cell = [](double place, std::size_t cells) { return std::min(std::size_t(place), cells - 1); };
   return entry_at(cell(at.h, kMerlThetaH), cell(at.d, kMerlThetaD), std::size_t(at.p) % kMerlPhiD);
 }

@@ -30,7 +30,7 @@ template <class T, std::size_t N> bool is_finite(const std::array<T, N>& a) {
   return std::ranges::all_of(a, [](T x) { return std::isfinite(x); });
 }
 
-Vector vector_of(const std::array<float, 3>& a) { return {a[0], a[1], a[2]}; }
+Vector vertex_of(const std::array<float, 3>& a) { return {a[0], a[1], a[2]}; }
 
 struct Triangle {
   std::array<Corner, 3> corners;
@@ -81,7 +81,7 @@ std::vector<std::array<std::size_t, 3>> cut(const Outline& p) {
 /// The triangles of all faces in the file's order: n - 2 for a face with n corners.
 std::vector<Triangle> triangulate(const MeshFile& file) {
   std::vector<Triangle> out;
-  const auto at = [&](const Corner& c) { return vector_of(file.positions[std::size_t(c.position)]); };
+  const auto at = [&](const Corner& c) { return vertex_of(file.positions[std::size_t(c.position)]); };
   for (std::size_t face = 0, begin = 0; face < file.ends.size(); begin = file.ends[face++]) {
     const std::size_t n = file.ends[face] - begin;
     const Corner* corners = &file.corners[begin];
@@ -134,7 +134,7 @@ class AveragedNormals {
       if (size == 0) continue;
       for (std::size_t k = 0; k < 3; ++k) {
         const auto at = [&](std::size_t i) {
-          return vector_of(file.positions[std::size_t(t.corners[(k + i) % 3].position)]);
+          return vertex_of(file.positions[std::size_t(t.corners[(k + i) % 3].position)]);
         };
         const Vector a = at(1) - at(0), b = at(2) - at(0);
         Vector& sum = sums_[place_[std::size_t(t.corners[k].position)]];
@@ -188,7 +188,7 @@ class Vertices {
   std::unordered_map<Key, std::size_t, Hash> known_;
 };
 
-MeshFile read_file(const fs::path& path) {
+MeshFile read_mesh_file(const fs::path& path) {
   if (!fs::is_regular_file(path)) input_error("{}: no such mesh file", path.string());
   const std::string type = ending(path);
   if (type == ".obj") return read_obj(path);
@@ -232,7 +232,7 @@ std::string read_bytes(const fs::path& path) {
 }
 
 Mesh read_mesh(const fs::path& path, bool smooth, const std::string& of_material, std::vector<std::string>* notes) {
-  const MeshFile file = read_file(path);
+  const MeshFile file = read_mesh_file(path);
   const std::string name = path.string();
   const auto note = [&](const std::string& text) {
     if (notes) notes->push_back(name + ": " + text);
@@ -295,7 +295,7 @@ Mesh read_mesh(const fs::path& path, bool smooth, const std::string& of_material
       Vector normal = t.normal;
       if (with_normals && c.normal >= 0) {
         if (usable_normal(c))
-          key = c.normal, normal = vector_of(file.normals[std::size_t(c.normal)]);
+          key = c.normal, normal = vertex_of(file.normals[std::size_t(c.normal)]);
         else
           bad_normal = true;
       } else if (with_normals && !file.flat && length(averaged->at(c.position)) > 0) {

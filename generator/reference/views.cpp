@@ -23,13 +23,15 @@ constexpr double kBorder = 2;
 /// A scene is tested for convexity only if it has no more pairs of a triangle and a vertex than this.
 constexpr std::size_t kPairs = 20'000'000;
 
-struct Corner {
+struct TriangleCorner {
   Vector p, normal;
 };
-using Corners = std::array<Corner, 3>;
+using Corners = std::array<TriangleCorner, 3>;
 
 Vector to_vector(const std::array<float, 3>& a) { return {a[0], a[1], a[2]}; }
-Corner middle(const Corner& a, const Corner& b) { return {(a.p + b.p) * 0.5, (a.normal + b.normal) * 0.5}; }
+TriangleCorner middle(const TriangleCorner& a, const TriangleCorner& b) {
+  return {(a.p + b.p) * 0.5, (a.normal + b.normal) * 0.5};
+}
 double angle_between(const Vector& a, const Vector& b) { return std::acos(std::clamp(dot(a, b), -1.0, 1.0)); }
 
 struct Cone {
@@ -112,7 +114,7 @@ void add_seen(Cosines& seen, const Viewer& viewer, const Corners& c, bool front,
     seen.add(here);
     return;
   }
-  const Corner ab = middle(c[0], c[1]), bc = middle(c[1], c[2]), ca = middle(c[2], c[0]);
+  const TriangleCorner ab = middle(c[0], c[1]), bc = middle(c[1], c[2]), ca = middle(c[2], c[0]);
   for (const Corners& part : {Corners{c[0], ab, ca}, Corners{ab, c[1], bc}, Corners{ca, bc, c[2]}, Corners{ab, bc, ca}})
     add_seen(seen, viewer, part, front, back, halvings - 1);
 }
