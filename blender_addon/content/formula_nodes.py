@@ -524,8 +524,10 @@ def _rest(w, parts, surface, given, lamps, narrow):
     )
     # From the last slot to the first, as in _keep_apart().
     met = 0.0
+    if lamps:
+        here = {"at": surface.place, "ray": ray}
+        here |= parts.add("density", **given | {"wi": drawn["wi"]})
     for lamp in reversed(lamps):
-        here = {"at": surface.place, "ray": ray, "density": drawn["density"]}
         inside = parts.add("met", **here | lamp)["met"]
         met = w.math("MAXIMUM", met, w.math("MULTIPLY", inside, lamp["shown"]))
     lost = w.math("MAXIMUM", hidden, met)

@@ -94,7 +94,7 @@ struct NodeRecording {
   Json closures, of_base;  ///< kinds of closures, and the names of their inputs
   Program give;            ///< computes the inputs of `closures`
   Program base;            ///< computes the inputs of `of_base`
-  Program value, draw;     ///< f cos - base and pdf; a drawn direction, its weight and pdf
+  Program value, draw;     ///< f cos - base and pdf; a drawn direction and its weight
 };
 
 /// Uses the current recorder; `fixed` must contain every choice.
@@ -134,8 +134,6 @@ NodeRecording record_nodes(const Model& model, const ParamValues& fixed) {
                                 : brdf->sample(wo, recorded_u());
   out.draw.output("wi", s.wi);
   out.draw.output("weight", base.empty() ? s.weight : s.weight - evaluate(base, s.wi, wo) / s.pdf);
-  // In every direction the same as for the lamps.
-  out.draw.output("density", beside ? brdf->pdf(s.wi, wo) : s.pdf);
   if (model.has_mirror()) {
     out.give.output("weight_0", brdf->mirror(wo));
     out.closures.push_back({{"kind", "mirror"}, {"weight", "weight_0"}});
@@ -171,10 +169,11 @@ std::vector<std::pair<const char*, NodeProgram>> record_parts(const Model& model
   if (!first.closures.empty()) add("closures", &NodeRecording::give);
   if (first.native) return out;
   if (!first.of_base.empty()) add("base", &NodeRecording::base);
-  const print::NodePrograms made =
-      print::node_programs(program(&NodeRecording::value), {"wi_x", "wi_y", "wi_z"}, "kept_", node_vectors());
+  const print::NodePrograms made = print::node_programs(program(&NodeRecording::value), {"wi_x", "wi_y", "wi_z"},
+                                                        "kept_", node_vectors(), {"density"});
   out.push_back({"once", made.once});
   out.push_back({"value", made.each});
+  out.push_back({"density", made.some});  // of the drawn direction, whichever choice drew it
   add("draw", &NodeRecording::draw);
   return out;
 }

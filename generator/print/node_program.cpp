@@ -474,7 +474,7 @@ NodeProgram node_program(const Program& program, const std::set<std::string>& ve
 }
 
 NodePrograms node_programs(const Program& program, const std::set<std::string>& varying, const std::string& prefix,
-                           const std::set<std::string>& vectors) {
+                           const std::set<std::string>& vectors, const std::set<std::string>& of_some) {
   const Program p = lowered_to_nodes(program);
   const std::vector<bool>& reachable = p.reachable();
   std::vector<bool> varies(reachable.size());
@@ -496,7 +496,10 @@ NodePrograms node_programs(const Program& program, const std::set<std::string>& 
       for (int a : n.args) pass(a);
   }
   for (const auto& [name, id] : p.outputs()) pass(id);
-  return {Writer(p, {}, vectors).write(passed), Writer(p, cuts, vectors).write(p.outputs())};
+  auto some = p.outputs();
+  std::erase_if(some, [&](const auto& output) { return !of_some.count(output.first); });
+  return {Writer(p, {}, vectors).write(passed), Writer(p, cuts, vectors).write(p.outputs()),
+          Writer(p, cuts, vectors).write(some)};
 }
 
 }  // namespace brdfc::print

@@ -64,9 +64,10 @@ struct NodePrograms {
   NodeProgram
       once;  ///< everything that does not depend on the varying inputs; some of its outputs are inputs of `each`
   NodeProgram each;
+  NodeProgram some;  ///< what of `each` computes the outputs `of_some`
 };
 /// `prefix`: the names of values passed from one to the other begin with it.
 NodePrograms node_programs(const Program&, const std::set<std::string>& varying, const std::string& prefix,
-                           const std::set<std::string>& vectors = {});
+                           const std::set<std::string>& vectors = {}, const std::set<std::string>& of_some = {});
 
 }  // namespace brdfc::print

@@ -108,7 +108,9 @@ def off_under_a_sun(extension, scene, tool, form, towards, samples, few_of, pict
         # much brighter: such dots are noise. One facet in thirty may have one.
         error = np.abs(picture[lit] - expected).sum(1)
         kept = np.argsort(error)[: -(len(error) // 30)]
-        off, noise = (x[kept].sum() / expected.sum() for x in (error, spread[lit].sum(1)))
+        # No picture shows less light than a millionth.
+        by = max(expected.sum(), 1e-6 * len(expected))
+        off, noise = (x[kept].sum() / by for x in (error, spread[lit].sum(1)))
         print(f"{name} {values}: {off:.2g}, noise {noise:.2g}")
         found.append((name, values, off, noise, expected.max()))
     return found

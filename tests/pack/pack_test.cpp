@@ -261,7 +261,8 @@ TEST(Shader, AnAlbedoOutputOfLargeTablesIsAShaderOfItsOwn) {
                                    .source;
       // Two aimed forms still contain too much for each of their many choices.
       const bool longer = kind == forms::form("aimed") && (name == "ashikhmin_shirley" || name == "radziszewski_alda");
-      EXPECT_LE(text.size(), longer || kind->native() ? 200000u : 116000u) << name << " " << kind->name();
+      // A list of nodes is in no file, but Blender makes a node of each entry.
+      EXPECT_LE(text.size(), kind->native() ? 210000u : longer ? 200000u : 116000u) << name << " " << kind->name();
     }
 }
 
