@@ -225,13 +225,14 @@ class Demo:
         self.about = made[0] if made else f"Measured in {file.name}"
 
     def run(self, name, command, *key, outputs=(), prints=True):
-        """The record of a command, from an earlier run if nothing has changed."""
+        """The record of a command, from an earlier run if nothing has changed: the programs, the
+        data, the command and `key`."""
         options = self.options
         task = Task(
             name=f"{self.name}/{name}",
             kind="measured",
             command=tuple(command),
-            key=digest(*options.sums.values(), self.data, *key),
+            key=digest(*options.sums.values(), self.data, *map(str, command), *key),
             folder=self.folder / "tasks",
             outputs=tuple(outputs),
             programs=(),
@@ -246,7 +247,7 @@ class Demo:
         curves = ("--models", "factors")
         lobes = ("--lobes", MOST_LOBES)
         records = {
-            name: self.run(f"fit-{name}", (*command, *extra), extra)
+            name: self.run(f"fit-{name}", (*command, *extra))
             for name, extra in (("formula", ()), ("curves", curves), ("lobes", lobes))
         }
         found = {name: record["records"] for name, record in records.items()}
@@ -254,7 +255,7 @@ class Demo:
         formula = next(f for f in self.told["fits"] if f["model"] != "factors")
         (curves,) = found["curves"]["fits"]
         if not found["lobes"]["sums"]:
-            raise TaskError(f"{self.file}: the data are black")
+            raise TaskError(f"{self.file}: expected data that reflect light, found black ones")
         best = found["lobes"]["sums"][-1]
         lobes = [{k: each[k] for k in ("model", "parameters")} for each in best["lobes"]]
         self.materials = {
@@ -301,7 +302,7 @@ class Demo:
         command += ["--jobs", folder / "tasks" / "jobs.json"]
         scenes = [folder / f"{name}.json" for name in FITS]
         outputs = [Path(job["out"]) for job in jobs]
-        record = self.run("blender", command, *scenes, outputs=outputs)
+        record = self.run("blender", command, jobs, *scenes, outputs=outputs)
         of_picture = {r["out"]: r for r in record["records"]}
         self.processor = record["processor"]
         self.pictures = {}
