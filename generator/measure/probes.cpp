@@ -38,8 +38,9 @@ std::vector<std::array<Vec3<double>, 2>> direction_pairs(const Brdf<double>& brd
     if (i % 16 == 7) wo = normal;
     if (two_sided && random() & 1) wo.z = -wo.z;
     if (two_sided && random() & 1) wi.z = -wi.z;
-    const Sample<double> s = brdf.sample(wo, uniform_cube(random));
-    if (i % 2 == 0 && s.pdf > 0 && (two_sided || s.wi.z > 0)) wi = s.wi;
+    const Vec3<double> u = uniform_cube(random);
+    if (i % 2 == 0)
+      if (const Sample<double> s = brdf.sample(wo, u); s.pdf > 0 && (two_sided || s.wi.z > 0)) wi = s.wi;
     if (i % 16 == 3) wi = {-wo.x, -wo.y, wo.z};
     if (i % 16 == 9) wi = wo;
     if (i % 16 == 11) wi = grazing();

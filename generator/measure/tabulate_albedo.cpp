@@ -227,13 +227,15 @@ class Tabulator {
       double chroma = 0;
       for (const Rgb<double>& v : values[t]) chroma = std::max({chroma, std::abs(v.r - v.g), std::abs(v.r - v.b)});
       g.channels = chroma > 1e-12 ? 3 : 1;
+      std::vector<double> numbers;
       for (const Rgb<double>& v : values[t]) {
-        g.values.push_back(double(float(v.r)));
+        numbers.push_back(double(float(v.r)));
         if (g.channels == 3) {
-          g.values.push_back(double(float(v.g)));
-          g.values.push_back(double(float(v.b)));
+          numbers.push_back(double(float(v.g)));
+          numbers.push_back(double(float(v.b)));
         }
       }
+      g.values = std::move(numbers);
       out.push_back(add_grid(std::move(g), group[t], at_probe));
     }
     return out;

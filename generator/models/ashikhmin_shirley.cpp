@@ -296,20 +296,24 @@ double rounded(double v, int digits) {
   return std::round(v / unit) * unit;
 }
 
-/// A table of at(coordinates in [0, 1]) over evenly spaced axes.
+/// A table of at(coordinates in [0, 1]) over evenly spaced axes. To record the formulas, as `brdfc list` does, its
+/// values are not needed.
 template <class F>
 std::shared_ptr<const Table> tabulate(const char* name, std::vector<TableAxis> axes, int precision, const F& at) {
-  std::size_t count = 1;
-  for (const TableAxis& a : axes) count *= a.values.size();
-  std::vector<double> values;
-  for (std::size_t i = 0; i < count; ++i) {
-    std::array<double, 4> x{};
-    std::size_t digits = i;
-    for (std::size_t d = axes.size(); d-- > 0; digits /= axes[d].values.size())
-      x[d] = axes[d].values[digits % axes[d].values.size()];
-    values.push_back(rounded(at(x), precision));
-  }
-  return make_table(name, std::move(axes), std::move(values));
+  const auto compute = [axes, precision, at] {
+    std::size_t count = 1;
+    for (const TableAxis& a : axes) count *= a.values.size();
+    std::vector<double> values;
+    for (std::size_t i = 0; i < count; ++i) {
+      std::array<double, 4> x{};
+      std::size_t digits = i;
+      for (std::size_t d = axes.size(); d-- > 0; digits /= axes[d].values.size())
+        x[d] = axes[d].values[digits % axes[d].values.size()];
+      values.push_back(rounded(at(x), precision));
+    }
+    return values;
+  };
+  return make_table_later(name, std::move(axes), compute);
 }
 
 /// A and B for a lobe with these slopes; the axes are rotated so that u is the wider one.

@@ -239,12 +239,16 @@ class Writer {
 
   NodeOperand add(const std::string& kind, const std::vector<NodeOperand>& operands, bool color,
                   const std::shared_ptr<const Table>& table = nullptr) {
-    for (std::size_t i = 0; i < out_.operations.size(); ++i) {
-      const NodeOperation& o = out_.operations[i];
-      if (o.kind == kind && o.operands == operands && o.table == table) return {int(i), "", {}, color};
+    int places = 0;
+    for (const NodeOperand& o : operands) places += o.result;
+    std::vector<int>& alike = of_kind_[{kind, places}];
+    for (const int i : alike) {
+      const NodeOperation& o = out_.operations[std::size_t(i)];
+      if (o.operands == operands && o.table == table) return {i, "", {}, color};
     }
     out_.operations.push_back({kind, operands, color, table});
-    return {int(out_.operations.size()) - 1, "", {}, color};
+    alike.push_back(int(out_.operations.size()) - 1);
+    return {alike.back(), "", {}, color};
   }
 
   /// True if the value has no other use, so that it can become part of another node.
@@ -455,6 +459,8 @@ class Writer {
   std::vector<int> uses_, need_;
   std::map<int, NodeOperand> known_;
   std::map<int, Truth> truths_;
+  /// Indices of the operations, by kind and the sum of the operands' indices, to find one that is there already.
+  std::map<std::pair<std::string, int>, std::vector<int>> of_kind_;
   NodeProgram out_;
 };
 

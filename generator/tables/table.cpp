@@ -15,15 +15,36 @@ TableAxis even_axis(std::string name, int size) {
   return axis;
 }
 
-std::shared_ptr<const Table> make_table(std::string name, std::vector<TableAxis> axes, std::vector<double> values) {
+namespace {
+
+/// The number of values over these axes.
+std::size_t count_of(const std::string& name, const std::vector<TableAxis>& axes) {
   std::size_t count = 1;
   for (const TableAxis& a : axes) {
     if (a.size() < 2) throw std::logic_error("table " + name + ": an axis needs two knots");
     count *= a.values.size();
   }
+  return count;
+}
+
+std::vector<double> checked(const std::string& name, std::size_t count, std::vector<double> values) {
   if (count != values.size()) throw std::logic_error("table " + name + ": axes do not match its values");
   for (std::size_t i = 0; i < values.size(); ++i)
     if (!std::isfinite(values[i])) throw ValueError(fmt::format("table {}: value {} is {}", name, i, values[i]));
+  return values;
+}
+
+}  // namespace
+
+std::shared_ptr<const Table> make_table(std::string name, std::vector<TableAxis> axes, std::vector<double> values) {
+  values = checked(name, count_of(name, axes), std::move(values));
+  return std::make_shared<const Table>(Table{std::move(name), std::move(axes), 1, std::move(values), 0});
+}
+
+std::shared_ptr<const Table> make_table_later(std::string name, std::vector<TableAxis> axes,
+                                              std::function<std::vector<double>()> compute) {
+  TableValues values(
+      [name, count = count_of(name, axes), compute = std::move(compute)] { return checked(name, count, compute()); });
   return std::make_shared<const Table>(Table{std::move(name), std::move(axes), 1, std::move(values), 0});
 }
 
@@ -47,6 +68,7 @@ Rgb<double> interpolate(const Table& t, const std::vector<double>& x) {
     cell.push_back(i);
     weight.push_back((to_scale(axis.scale, clamped) - lo) / (hi - lo));
   }
+  const std::vector<double>& values = t.values;
   Rgb<double> sum(0);
   for (std::size_t corner = 0; corner < (std::size_t(1) << cell.size()); ++corner) {
     std::size_t index = 0;
@@ -56,7 +78,7 @@ Rgb<double> interpolate(const Table& t, const std::vector<double>& x) {
       index = index * t.axes[a].values.size() + cell[a] + (upper ? 1 : 0);
       w *= upper ? weight[a] : 1 - weight[a];
     }
-    const double* v = &t.values[index * std::size_t(t.channels)];
+    const double* v = &values[index * std::size_t(t.channels)];
     sum += t.channels == 1 ? Rgb<double>(w * v[0]) : Rgb<double>(w * v[0], w * v[1], w * v[2]);
   }
   return sum;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -13,6 +14,7 @@
 #include "core/pack.h"
 #include "core/scalar.h"
 #include "core/vec.h"
+#include "tables/table_values.h"
 
 namespace brdfc::inline tables {
 
@@ -33,7 +35,7 @@ struct Table {
   std::string name;             ///< identifier of the array in OSL; may be empty if no formula looks the table up
   std::vector<TableAxis> axes;  ///< empty for a constant
   int channels = 1;             ///< 1, if red, green and blue are the same; otherwise 3
-  std::vector<double> values;   ///< row-major, first axis slowest, channel innermost; may be negative
+  TableValues values;           ///< row-major, first axis slowest, channel innermost; may be negative
   double error = 0;             ///< largest known difference from the tabulated quantity, in units of the values
 
   /// Number of values in one channel.
@@ -43,6 +45,9 @@ struct Table {
 /// Makes a table, after checking that axes and values match and that every value is finite. Throws std::logic_error for
 /// a malformed table, and ValueError that names table, index and value for a value that is not finite.
 std::shared_ptr<const Table> make_table(std::string name, std::vector<TableAxis> axes, std::vector<double> values);
+/// The same with values that are computed, and checked, when they are first read.
+std::shared_ptr<const Table> make_table_later(std::string name, std::vector<TableAxis> axes,
+                                              std::function<std::vector<double>()> compute);
 
 /// Looks up any table at one coordinate per axis, in units of the axis. Interpolation is linear on the scales of the
 /// axes; coordinates beyond the ends are clamped.
@@ -58,6 +63,7 @@ template <Numeric T, std::size_t D> T lookup(const std::shared_ptr<const Table>&
     index[d] = std::min(std::size_t(position), std::size_t(table->axes[d].size() - 2));
     fraction[d] = position - T(index[d]);
   }
+  const std::vector<double>& values = table->values;
   T sum(0);
   for (std::size_t corner = 0; corner < (1u << D); ++corner) {
     T weight(1);
@@ -67,7 +73,7 @@ template <Numeric T, std::size_t D> T lookup(const std::shared_ptr<const Table>&
       weight = weight * (up ? fraction[d] : T(1) - fraction[d]);
       flat = flat * std::size_t(table->axes[d].size()) + index[d] + up;
     }
-    sum = sum + weight * T(table->values[flat]);
+    sum = sum + weight * T(values[flat]);
   }
   return sum;
 }

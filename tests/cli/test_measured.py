@@ -15,14 +15,11 @@ from measured_files import (
     KINDS,
     golden_directions,
     hemisphere,
-    merl,
-    merl_directions,
     rgl_fields,
-    tensor,
-    unit,
     utia,
     utia_directions,
 )
+from measured_formats import merl, merl_directions, tensor, unit
 from support import ROOT, TOOL, run, scene
 
 COLUMNS = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z"

@@ -83,7 +83,9 @@ TEST(StoredAlbedos, AreReadNumberForNumber) {
   expect_kept(made);
   Table& grid = made.grids.front();
   grid.channels = 3;
-  for (std::size_t i = 0, n = 2 * grid.values.size(); i < n; ++i) grid.values.push_back(0.01f * float(i));
+  std::vector<double> values = grid.values;
+  for (std::size_t i = 0, n = 2 * values.size(); i < n; ++i) values.push_back(0.01f * float(i));
+  grid.values = values;
   expect_kept(made);
   std::set<AxisScale> scales;
   for (const Model* model : stored()) {

@@ -26,10 +26,11 @@ Table random_grid(int channels) {
   Table t = grid();
   t.axes.push_back(even_axis("c", 4));
   t.channels = channels;
-  t.values.clear();
+  std::vector<double> values;
   std::mt19937 random(3);
   std::uniform_real_distribution<float> uniform(-1, 1);
-  for (int i = 0; i < 3 * 3 * 4 * channels; ++i) t.values.push_back(double(uniform(random)));
+  for (int i = 0; i < 3 * 3 * 4 * channels; ++i) values.push_back(double(uniform(random)));
+  t.values = values;
   return t;
 }
 
@@ -53,6 +54,23 @@ TEST(Tables, FormulasLookUpWhatInterpolationGives) {
   for (const double x : {-1., 0., 0.3, 0.5, 0.9, 1., 2.})
     for (const double y : {0., 0.4, 1.})
       EXPECT_NEAR(lookup(t, std::array<double, 2>{x, y}), interpolate(*t, {x, y}).r, 1e-14);
+}
+
+TEST(Tables, ValuesMayBeComputedWhenTheyAreFirstRead) {
+  int computed = 0;
+  const auto t = make_table_later("t", {even_axis("x", 3)}, [&] {
+    ++computed;
+    return std::vector<double>{0, 1, 4};
+  });
+  const Table copy = *t;
+  EXPECT_EQ(t->axes.size(), 1);
+  EXPECT_EQ(computed, 0);
+  EXPECT_EQ(lookup(t, std::array<double, 1>{0.75}), 2.5);
+  EXPECT_EQ(interpolate(copy, {0.75}).r, 2.5);
+  EXPECT_EQ(computed, 1);
+  const auto few = make_table_later("t", {even_axis("x", 3)}, [] { return std::vector<double>{0, 1}; });
+  EXPECT_THROW(interpolate(*few, {0.5}), std::logic_error);
+  EXPECT_THROW(make_table_later("t", {even_axis("x", 1)}, [] { return std::vector<double>{0}; }), std::logic_error);
 }
 
 TEST(Tables, OnlyEvenAxesAreLookedUpByFormulas) {

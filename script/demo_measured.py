@@ -1,0 +1,516 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shows measured materials: files, what is fitted to them, and pictures of both on one page.
+
+    python script/demo_measured.py --tool TOOL --extension ZIP --python PYTHON --out DIR [FILE...]
+
+Without FILE it makes three measured files, of sums that no single model of brdfc follows. For each
+file, `brdfc measured` fits the models, curves and lobes. A ball is then rendered from the data by
+the reference renderer, and from each fit in Blender, with Open Shading Language on and off. DIR
+gets a folder for each file, index.html with all pictures, and sheet.jpg, a selection of them.
+
+The Python package of `brdfc python` must be importable: it evaluates the made materials. Results of
+earlier runs with the same inputs and programs are kept.
+"""
+
+import argparse
+import html
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+from demo_matrix import RENDER_SCENE
+from demo_tasks import Task, TaskError, digest, run_task, write_json
+from measured_formats import merl, merl_directions, tensor
+from pictures import read_rgb
+
+#: Pixels of a picture; samples a pixel in Blender, which denoises, and of the reference.
+SIZE, SPP, REFERENCE_SPP = 160, 32, 512
+#: Fits, by the name of their scene file.
+FITS = {"formula": "Nearest formula", "curves": "Curves", "lobes": "Sum of lobes"}
+MOST_LOBES = 4
+#: Difference in full colour, relative to the mean of the picture of the data.
+DIFFERENCE_SCALE = 0.5
+
+# ---- files -------------------------------------------------------------------------------------
+
+
+def f_of(models, wi, wo):
+    """The sum of f of models; `models` has rows (name, parameters)."""
+    import brdfc
+
+    return sum(np.asarray(brdfc.model(name).eval(wi, wo, **values)) for name, values in models)
+
+
+def direction(theta, phi):
+    """Unit vectors of angles in radians."""
+    theta, phi = np.broadcast_arrays(theta, phi)
+    s = np.sin(theta)
+    return np.stack([s * np.cos(phi), s * np.sin(phi), np.cos(theta)], -1)
+
+
+def car_paint():
+    """MERL's format, with noise of 2 % in each number."""
+    models = [
+        ("lambert", {"rho": (0.015, 0.03, 0.12)}),
+        ("microfacet", {"f0": (0.05, 0.16, 0.42), "tint": (0.3,) * 3, "ax": 0.38, "ay": 0.38}),
+        ("microfacet", {"f0": (0.06, 0.06, 0.06), "ax": 0.07, "ay": 0.07}),
+    ]
+    wi, wo = merl_directions()
+    f = f_of(models, wi, wo)
+    return merl(f * np.random.default_rng(1).normal(1, 0.02, f.shape))
+
+
+def brushed_copper():
+    """RGL's format, anisotropic: half of the azimuths, as files of that database have."""
+    models = [
+        ("microfacet", {"f0": (0.6, 0.36, 0.25), "ax": 0.07, "ay": 0.32}),
+        ("microfacet", {"f0": (0.35, 0.2, 0.13), "tint": (0.3,) * 3, "ax": 0.3, "ay": 0.6}),
+    ]
+    thetas, phis = np.radians(np.linspace(0, 86, 15)), np.linspace(-np.pi, 0, 17)
+    view = direction(thetas, phis[:, None])
+    # The coordinates of half vectors are sqrt(2 theta / pi) and the azimuth from -pi.
+    height, width = 64, 48
+    theta = np.linspace(0, 1, width) ** 2 * np.pi / 2
+    phi = np.linspace(-np.pi, np.pi, height)
+    half = direction(np.clip(theta, 1e-4, np.pi / 2 - 1e-4), phi[:, None])
+    # With constant `vndf` and `sigma`, a value is 4 f cos / ndf at the half vector itself. `ndf` is
+    # like the highlight, so the quotient is smooth and can be interpolated.
+    ndf = f_of(models, half, half).mean(-1) * half[..., 2] ** 2 + 1e-6
+    view, half = np.broadcast_arrays(view[:, :, None, None], half)
+    light = 2 * (view * half).sum(-1, keepdims=True) * half - view
+    above = light[..., 2:] > 1e-3
+    light = np.where(above, light, (0, 0, 1))
+    value = np.where(above, f_of(models, light, view) * light[..., 2:], 0) * 4 / ndf[..., None]
+    ones = np.ones((2, 2), np.float32)
+    fields = {
+        "description": np.frombuffer(b"Made of two lobes", np.uint8),
+        "jacobian": np.array([1], np.uint8),
+        "phi_i": phis,
+        "theta_i": thetas,
+        "ndf": ndf,
+        "sigma": ones,
+        "vndf": np.broadcast_to(ones, (len(phis), len(thetas), 2, 2)),
+        "rgb": np.moveaxis(value, -1, 2),
+    }
+    return tensor({k: a if a.dtype == np.uint8 else a.astype("f4") for k, a in fields.items()})
+
+
+def road_marking():
+    """A table: paint that sends a part of the light back to the lamp."""
+    models = [
+        ("lambert", {"rho": (0.3, 0.25, 0.08)}),
+        ("lafortune", {"cxy": 1, "cz": 0.9, "e": 12, "ks": (0.3, 0.25, 0.1)}),
+        ("cook_torrance", {"m": 0.2, "f0": (0.05, 0.05, 0.05)}),
+    ]
+    theta, phi = np.arange(0, 90, 3), np.arange(0, 181, 3)
+    grid = np.stack(np.meshgrid(theta, [0], theta, phi, indexing="ij"), -1).reshape(-1, 4)
+    radians = np.radians(grid)
+    f = f_of(models, direction(*radians[:, :2].T), direction(*radians[:, 2:].T))
+    rows = "".join(
+        ",".join(f"{x:.7g}" for x in row) + "\n" for row in np.concatenate([grid, f], 1).tolist()
+    )
+    return ("theta_i,phi_i,theta_o,phi_o,r,g,b\n" + rows).encode()
+
+
+#: The made files: what they are for the page, and what makes them.
+MADE = {
+    "car-paint.binary": (
+        "Blue paint with flakes under a clear coat, in MERL's format, with noise of 2 %",
+        car_paint,
+    ),
+    "brushed-copper.bsdf": (
+        "Brushed copper with a wide glow, anisotropic, in RGL's format",
+        brushed_copper,
+    ),
+    "road-marking.csv": ("Paint that sends light back to the lamp, as a table", road_marking),
+}
+
+
+def make_files(out):
+    for name, (_, make) in MADE.items():
+        file = out / "files" / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        data = make()
+        if not file.is_file() or file.read_bytes() != data:
+            file.write_bytes(data)
+        yield file
+
+
+# ---- fits --------------------------------------------------------------------------------------
+
+
+def material_of(fit):
+    """The material of a fit, for a scene file."""
+    model = {"model": fit["model"], "parameters": fit["parameters"]}
+    if fit["matte"] is None:
+        return model
+    return {"sum": [model, {"model": "lambert", "parameters": {"rho": fit["matte"]}}]}
+
+
+def text_of(material, most=None):
+    """The models of a material and their parameters; of each at most so many."""
+
+    def text(value):
+        if isinstance(value, list):
+            return ",".join(f"{x:.3g}" for x in value)
+        return value if isinstance(value, str) else f"{value:.3g}"
+
+    out = []
+    for lobe in material.get("sum", [material]):
+        values = [f"{k}={text(v)}" for k, v in lobe["parameters"].items()]
+        left = values[most:] if most else []
+        more = [f"and {len(left)} more"] if left else []
+        out.append((lobe["model"], " ".join(values[: len(values) - len(left)] + more)))
+    return out
+
+
+# ---- pictures ----------------------------------------------------------------------------------
+
+
+def ball_scene(name, material, size):
+    """A ball on a floor, under a lamp, in a dim room; a lamp at the viewer shows what is sent
+    back."""
+    lamp = {"type": "point", "radius": 0.1}
+    return {
+        "name": name,
+        "description": f"A ball of {name}.",
+        "settings": {"width": size, "height": size, "spp": SPP, "seed": 1, "max_bounces": 4},
+        "camera": {
+            "type": "perspective",
+            "position": [0, -7, 2.1],
+            "look_at": [0, 0, 0.46],
+            "fov_y_degrees": 9.8,
+        },
+        "materials": {
+            "floor": {"model": "lambert", "parameters": {"rho": [0.12, 0.12, 0.12]}},
+            "ball": material,
+        },
+        "objects": [
+            {"name": "floor", "shape": {"type": "quad", "size": [40, 40]}, "material": "floor"},
+            {
+                "name": "ball",
+                "shape": {
+                    "type": "sphere",
+                    "radius": 0.5,
+                    "segments": 128,
+                    "rings": 64,
+                    "smooth": True,
+                },
+                "transform": {"translate": [0, 0, 0.501]},
+                "material": "ball",
+            },
+        ],
+        "lights": [
+            lamp | {"position": [-2.6, -3.2, 4], "power": 280},
+            lamp | {"position": [0.2, -6.5, 2.4], "power": 180},
+        ],
+        "environment": {"procedural": "interior", "width": 512, "strength": 0.3},
+    }
+
+
+class Demo:
+    """What is made of one file, in a folder of its own."""
+
+    def __init__(self, file, options):
+        self.file, self.options = file, options
+        self.name = file.stem
+        self.folder = options.out / self.name
+        self.data = digest(file)
+        (self.folder / "tasks").mkdir(parents=True, exist_ok=True)
+        made = MADE.get(file.name) if file.parent == options.out / "files" else None
+        self.about = made[0] if made else f"Measured in {file.name}"
+
+    def run(self, name, command, *key, outputs=(), prints=True):
+        """The record of a command, from an earlier run if nothing has changed: the programs, the
+        data, the command and `key`."""
+        options = self.options
+        task = Task(
+            name=f"{self.name}/{name}",
+            kind="measured",
+            command=tuple(command),
+            key=digest(*options.sums.values(), self.data, *map(str, command), *key),
+            folder=self.folder / "tasks",
+            outputs=tuple(outputs),
+            programs=(),
+            prints_records=prints,
+        )
+        return run_task(task)
+
+    def fit(self):
+        """Fills `told`, what the tool says of the file; `materials` and `misplaced` by fit; and
+        `seconds` from the file to the fit."""
+        command = [self.options.tool, "measured", self.file, "--json"]
+        curves = ("--models", "factors")
+        lobes = ("--lobes", MOST_LOBES)
+        records = {
+            name: self.run(f"fit-{name}", (*command, *extra))
+            for name, extra in (("formula", ()), ("curves", curves), ("lobes", lobes))
+        }
+        found = {name: record["records"] for name, record in records.items()}
+        self.told = found["formula"]
+        formula = next(f for f in self.told["fits"] if f["model"] != "factors")
+        (curves,) = found["curves"]["fits"]
+        if not found["lobes"]["sums"]:
+            raise TaskError(f"{self.file}: expected data that reflect light, found black ones")
+        best = found["lobes"]["sums"][-1]
+        lobes = [{k: each[k] for k in ("model", "parameters")} for each in best["lobes"]]
+        self.materials = {
+            "formula": material_of(formula),
+            "curves": material_of(curves),
+            "lobes": {"sum": lobes},
+        }
+        self.misplaced = {
+            "formula": formula["error"],
+            "curves": curves["error"],
+            "lobes": best["error"],
+        }
+        self.seconds = {name: record["wall_seconds"] for name, record in records.items()}
+
+    def render(self):
+        """Renders the data by the reference renderer and the fits in Blender. Fills `pictures`,
+        records of Blender by fit and whether OSL is on."""
+        tool, folder, size = self.options.tool, self.folder, self.options.size
+        scenes = {"data": {"measured": os.path.relpath(self.file, folder)}} | self.materials
+        for name, material in scenes.items():
+            write_json(folder / f"{name}.json", ball_scene(self.name, material, size))
+        data = folder / "data.exr"
+        command = [tool, "render", folder / "data.json", "--spp", REFERENCE_SPP, "--out", data]
+        self.run("data", command, folder / "data.json", outputs=(data,), prints=False)
+        for name in FITS:
+            resolved = folder / name / "scene.json"
+            command = [tool, "scene", folder / f"{name}.json", "--out", folder / name]
+            key = folder / f"{name}.json"
+            self.run(f"scene-{name}", command, key, outputs=(resolved,), prints=False)
+        jobs = [
+            {
+                "name": f"{self.name} {name}, OSL {'on' if osl else 'off'}",
+                "scene": str(folder / name / "scene.json"),
+                "out": str(self.picture(name, osl)),
+                "representation": "auto",
+                "osl": osl,
+                "denoise": True,
+            }
+            for name in FITS
+            for osl in (True, False)
+        ]
+        write_json(folder / "tasks" / "jobs.json", jobs)
+        command = [self.options.python, RENDER_SCENE, "--extension", self.options.extension]
+        command += ["--jobs", folder / "tasks" / "jobs.json"]
+        scenes = [folder / f"{name}.json" for name in FITS]
+        outputs = [Path(job["out"]) for job in jobs]
+        record = self.run("blender", command, jobs, *scenes, outputs=outputs)
+        of_picture = {r["out"]: r for r in record["records"]}
+        self.processor = record["processor"]
+        self.pictures = {}
+        for name in FITS:
+            for osl in (True, False):
+                picture = self.picture(name, osl)
+                self.pictures[name, osl] = of_picture[str(picture)]
+                difference = self.difference(name, osl)
+                command = [tool, "compare", picture, data, "--json", "--diff", difference]
+                command += ["--diff-scale", DIFFERENCE_SCALE]
+                self.run(f"compare-{picture.stem}", command, picture, data, outputs=(difference,))
+
+    def picture(self, name, osl):
+        return self.folder / f"{name}-{'osl' if osl else 'nodes'}.exr"
+
+    def difference(self, name, osl):
+        picture = self.picture(name, osl)
+        return picture.with_name(f"{picture.stem}-difference.png")
+
+    def first_pixel(self, name, osl):
+        """Seconds from the file to a picture of one sample."""
+        record = self.pictures[name, osl]
+        in_blender = record["load_wall_seconds"] + record["one_sample_wall_seconds"]
+        return self.seconds[name] + in_blender
+
+
+# ---- page --------------------------------------------------------------------------------------
+
+STYLE = """
+:root { color-scheme: light dark; }
+body { margin: 2rem auto; padding: 0 1.5rem; max-width: 70rem;
+  font: 16px/1.5 system-ui, sans-serif; }
+table { border-collapse: collapse; width: 100%; table-layout: fixed; font-size: .9rem; }
+th, td { padding: .35rem .5rem; text-align: left; vertical-align: top; overflow-wrap: anywhere; }
+tr { border-bottom: 1px solid #8884; }
+th:first-child { width: 9rem; }
+p { max-width: 52rem; }
+img { display: block; width: 100%; }
+code { font-size: .85em; }
+"""
+OSL = {True: "Open Shading Language on", False: "Open Shading Language off"}
+
+
+def percent(share):
+    return f"{100 * share:.2g} %"
+
+
+def write_png(exr):
+    """The picture beside it, as a display shows it."""
+    pixels = np.clip(read_rgb(exr), 0, 1).astype("f4")
+    shown = np.where(pixels <= 0.0031308, 12.92 * pixels, 1.055 * pixels ** (1 / 2.4) - 0.055)
+    png = exr.with_suffix(".png")
+    if not oiio.ImageBuf(np.ascontiguousarray(shown)).write(str(png), "uint8"):
+        raise TaskError(f"{png}: cannot be written")
+    return png
+
+
+def section(demo):
+    def source(path):
+        return html.escape(path.relative_to(demo.options.out).as_posix())
+
+    def image(path, text):
+        return f'<img src="{source(path)}" alt="{html.escape(text)}">'
+
+    def row(title, cells, tag="td"):
+        return f"<tr><th>{title}</th>" + "".join(f"<{tag}>{c}</{tag}>" for c in cells) + "</tr>\n"
+
+    told = demo.told
+    kind = "isotropic" if told["isotropic"] else "anisotropic"
+    facts = [f"{told['format']}, {kind}, {told['grid']}.", *told["notes"], *told["lacks"]]
+    rows = [row("", ["Data", *FITS.values()], "th")]
+    rows.append(row("Misplaced light", ["", *(percent(demo.misplaced[n]) for n in FITS)]))
+    for osl, words in OSL.items():
+        cells = [image(demo.folder / "data.png", "the data") + "<small>reference renderer</small>"]
+        differences = [""]
+        for name in FITS:
+            picture = image(demo.picture(name, osl).with_suffix(".png"), f"{name}, {words}")
+            after = f"<small>first pixel after {demo.first_pixel(name, osl):.1f} s</small>"
+            cells.append(picture + after)
+            text = f"difference of {name}, {words}"
+            differences.append(image(demo.difference(name, osl), text))
+        rows += [row(words, cells), row("Difference", differences)]
+    models = (
+        "<br>".join(f"{model} <code>{html.escape(values)}</code>" for model, values in text)
+        for text in (text_of(demo.materials[name], 8) for name in FITS)
+    )
+    rows.append(row("Models", ["", *models]))
+    return (
+        f"<h2>{html.escape(demo.file.name)}</h2>\n<p>{html.escape(demo.about)}. "
+        f"{html.escape(' '.join(facts))}</p>\n<table>\n{''.join(rows)}</table>\n"
+    )
+
+
+def write_page(demos, out):
+    blender = next(iter(demos[0].pictures.values()))["blender"]
+    text = f"""<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><title>Measured materials</title>
+<meta name="viewport" content="width=device-width">
+<style>{STYLE}</style></head><body>
+<h1>Measured materials</h1>
+<p>Each file is rendered from its data by the reference renderer, and in Blender with what is fitted
+to the data: the formula that comes closest, with matte light beside it; curves, which are the model
+<code>factors</code>; and a sum of up to {MOST_LOBES} lobes. Misplaced light is the part of the
+reflected light that the fit sends in other directions than the data do.</p>
+<p>The first pixel is there after <code>brdfc measured</code> has read the file and fitted all
+formulas, the curves or the lobes, and Blender has loaded the scene and rendered one sample. Blender
+is open by then. Its pictures are denoised. Differences are red where Blender is brighter than the
+data and blue where it is darker, in full colour at {percent(DIFFERENCE_SCALE)} of the mean.</p>
+{"".join(section(demo) for demo in demos)}
+<p><small>Blender {html.escape(blender)}; {html.escape(demos[0].processor)}; {SPP} samples a pixel,
+the reference {REFERENCE_SPP}.</small></p>
+</body></html>
+"""
+    (out / "index.html").write_text(text, encoding="utf-8")
+
+
+def write_sheet(demos, file):
+    """A row for each file: the data and the fits, as Blender renders them with OSL off."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    columns = 1 + len(FITS)
+    figure, axes = pyplot.subplots(
+        len(demos), columns, figsize=(2 * columns, 2.3 * len(demos)), squeeze=False
+    )
+    for row, demo in zip(axes, demos, strict=True):
+        shown = [(demo.folder / "data.png", demo.file.name, "the data")]
+        for name, title in FITS.items():
+            models = " + ".join(model for model, _ in text_of(demo.materials[name]))
+            off = f"{title.lower()}, {percent(demo.misplaced[name])} misplaced"
+            shown.append((demo.picture(name, False).with_suffix(".png"), models, off))
+        for place, (picture, first, second) in zip(row, shown, strict=True):
+            place.axis("off")
+            place.imshow(pyplot.imread(picture))
+            at = {"x": 0.5, "ha": "center", "transform": place.transAxes}
+            place.text(y=-0.07, s=first, fontsize=6.5, **at)
+            place.text(y=-0.14, s=second, fontsize=6.5, color="0.4", **at)
+    figure.subplots_adjust(0.005, 0.05, 0.995, 0.998, 0.03, 0.16)
+    figure.savefig(file, dpi=110, pil_kwargs={"quality": 88})
+
+
+# ---- command line ------------------------------------------------------------------------------
+
+
+def parse():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="measured BRDFs")
+    parser.add_argument("--tool", required=True, type=Path, help="the program brdfc")
+    parser.add_argument("--extension", required=True, type=Path, help="brdfc_shaders-<version>.zip")
+    parser.add_argument("--python", required=True, type=Path, help="a Python that has bpy")
+    parser.add_argument("--out", required=True, type=Path, help="folder of the results")
+    parser.add_argument("--size", type=int, default=SIZE, help=f"pixels of a picture ({SIZE})")
+    options = parser.parse_args()
+    if not 1 <= options.size <= 4096:
+        parser.error(f"--size: expected 1 to 4096 pixels, got {options.size}")
+    for name in ("tool", "extension", "out"):
+        setattr(options, name, getattr(options, name).resolve())
+    # Not resolved: the interpreter of a virtual environment is a link.
+    options.python = options.python.absolute()
+    options.files = [file.resolve() for file in options.files]
+    for path in (options.tool, options.extension, options.python, *options.files):
+        if not path.is_file():
+            parser.error(f"{path}: no such file")
+    stems = [file.stem for file in options.files]
+    if repeated := sorted({stem for stem in stems if stems.count(stem) > 1}):
+        parser.error(f"expected files of different names, got {repeated[0]} twice")
+    options.sums = {p: digest(p) for p in (options.tool, options.extension, RENDER_SCENE)}
+    return options
+
+
+def print_fits(demo):
+    told = demo.told
+    kind = "isotropic" if told["isotropic"] else "anisotropic"
+    print(f"    {demo.file.name}: {told['format']}, {kind}, {told['grid']}")
+    for name, title in FITS.items():
+        off, seconds = percent(demo.misplaced[name]), demo.seconds[name]
+        print(f"      {title.lower():<16} misplaces {off:>7} of the light, after {seconds:4.1f} s")
+        for model, values in text_of(demo.materials[name], 8):
+            print(f"        {model:<20} {values}")
+    sys.stdout.flush()
+
+
+def main():
+    options = parse()
+    for file in options.files:
+        command = [options.tool, "measured", file, "--models", "none"]
+        checked = subprocess.run(command, stdout=subprocess.DEVNULL)
+        if checked.returncode != 0:
+            sys.exit(checked.returncode)
+    try:
+        demos = [Demo(file, options) for file in options.files or make_files(options.out)]
+        for demo in demos:
+            demo.fit()
+            print_fits(demo)
+        for demo in demos:
+            print(f"    {demo.file.name}: rendering", flush=True)
+            demo.render()
+            for exr in (demo.folder / "data.exr", *(demo.picture(*key) for key in demo.pictures)):
+                write_png(exr)
+    except (TaskError, OSError) as error:
+        sys.exit(f"demo_measured: {error}")
+    write_page(demos, options.out)
+    write_sheet(demos, options.out / "sheet.jpg")
+
+
+if __name__ == "__main__":
+    main()
