@@ -521,9 +521,9 @@ def warnings(material, scene):
 
 
 def scene_warnings(scene):
-    """What keeps every material of this extension from rendering correctly in a scene, and which
-    other parts of the scene Open Shading Language would spoil."""
-    return checks.scene_warnings(argument_checks.scene(scene))
+    """What keeps materials of the file from rendering in a scene, if they need Open Shading
+    Language; and which other parts of the scene Open Shading Language spoils."""
+    return checks.of_file(argument_checks.scene(scene))
 
 
 def follow_settings(scene):
@@ -559,8 +559,7 @@ def make_local(material):
     It can then be edited, and aims at this file's lamps. Returns the local material; linked objects
     keep the linked one."""
     argument_checks.material(material)
-    if editable.refusal(material):
-        material = material.make_local()
+    material = editable.local(material)
     nodes.make_local(material.node_tree)
     lamps.follow()
     automatic.follow()

@@ -44,3 +44,15 @@ def check(*blocks):
     """Raises ValueError with the text of refusal(), if there is one."""
     if why := refusal(*blocks):
         raise ValueError(why)
+
+
+def local(block):
+    """The block itself if its changes are saved; otherwise a block of this file in its place."""
+    if keeps_changes(block):
+        return block
+    if block.library is None or not block.is_library_indirect:
+        made = block.make_local()
+        if keeps_changes(made):
+            return made
+    # Blender makes nothing local that other linked data use, as a linked object its material.
+    return block.copy()

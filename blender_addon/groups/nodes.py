@@ -479,8 +479,8 @@ def make_local(tree):
     for node in tree.nodes:
         for name in ("node_tree", "script", "image"):
             inner = getattr(node, name, None)
-            if inner is not None and editable.refusal(inner):
-                inner.make_local()
+            if inner is not None and not editable.keeps_changes(inner):
+                setattr(node, name, editable.local(inner))
         if getattr(node, "node_tree", None) is not None:
             make_local(node.node_tree)
 

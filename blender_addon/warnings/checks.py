@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finds what makes a material of this extension render wrong: asks each row of the table."""
 
+import bpy
+
 from ..common import i18n
 from ..common.i18n import Sentence, say
 from ..groups import nodes
@@ -57,8 +59,15 @@ def _twin_error(node):
 
 
 def scene_warnings(scene):
-    """See api.scene_warnings()."""
+    """What keeps shaders of Open Shading Language from running in a scene, or is spoilt by it."""
     return _found(OF_SCENE, SceneContext(scene))
+
+
+def of_file(scene):
+    """See api.scene_warnings()."""
+    ours = [node for material in bpy.data.materials for node in nodes.shown_nodes(material)]
+    needed = not all(map(nodes.runs_anywhere, ours))
+    return [f for f in scene_warnings(scene) if needed or f.code not in UNABLE]
 
 
 def of_scene(ours, scene):

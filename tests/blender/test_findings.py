@@ -392,6 +392,15 @@ def in_the_world(material):
     write_aov(helpers.add_world(bpy.context.scene)[0], "ID")
 
 
+def test_osl_is_missed_only_where_a_material_needs_it(extension, empty):
+    api = extension.api
+    empty.render.engine, empty.cycles.shading_system = "CYCLES", False
+    api.new_material("ward")
+    assert api.scene_warnings(empty) == []
+    api.new_material("ward", "aimed")
+    assert [f.code for f in api.scene_warnings(empty)] == ["osl_off"]
+
+
 @pytest.mark.parametrize("write", [in_the_material, in_another_one, in_a_group, in_the_world])
 def test_black_aovs_are_a_finding(extension, empty, write):
     api = extension.api

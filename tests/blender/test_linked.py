@@ -224,6 +224,22 @@ def test_made_local_with_its_object(extension, library, tmp_path, get):
     changed_and_kept(extension, tmp_path)
 
 
+def test_a_script_makes_the_material_of_a_linked_object_local(extension, library):
+    """The linked object keeps its material, which is as it was."""
+    item = linked(library, "objects", "Sphere")
+    make_active(item)
+    theirs = item.data.materials[0]
+    before = state(extension, theirs)
+    material = extension.api.make_local(theirs)
+    assert material.library is None and item.data.materials[0] == theirs != material
+    assert state(extension, theirs) == before
+    (node,) = extension.nodes.group_nodes(material)
+    assert node.node_tree.library is None
+    extension.api.set_parameters(material, e=30.0)
+    extension.api.switch_representation(material, "aimed")
+    assert state(extension, theirs) == before
+
+
 def test_new_materials_are_for_what_keeps_them(extension, library, tmp_path):
     item = overridden(library, "objects", "Sphere")
     make_active(item)
