@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Chooses the model that replaces a node, with its values and links, and estimates the error."""
 
+import functools
 import math
 from dataclasses import dataclass, field, replace
 
@@ -121,15 +122,21 @@ def _plan_glass(material, node):
     return Plan("fresnel_dielectric", values, links, (), material, node, error, error)
 
 
-def _is_shown(model, values):
-    """Whether a scene can show a model with these values: a pack cut to a scene may lack it, and
-    without OSL some choices are shown by a twin."""
-    if model not in pack.model_names():
-        return False
-    form = pack.native_form(model)
-    if form is None or not device.lacks_osl(lamps.current_scene()):
-        return True
-    return pack.reason_unavailable(model, form, pack.canonical(values)) is None
+@functools.cache
+def _shown(without_osl):
+    """Whether a scene with or without OSL can show a model with some values, as a function of both:
+    a pack cut to a scene may lack the model, and without OSL some choices are shown by a twin. The
+    same function each time, as nearest() keeps what it found by it."""
+
+    def has(model, values):
+        if model not in pack.model_names():
+            return False
+        form = pack.native_form(model)
+        if form is None or not without_osl:
+            return True
+        return pack.reason_unavailable(model, form, pack.canonical(values)) is None
+
+    return has
 
 
 def _part(inputs, native, fit):
@@ -156,7 +163,8 @@ def _plan_node(material, node):
     def near(**other):
         """The Part for the node with these values changed, and its Fit."""
         looked = tuple(Native(**given | other, roughness=r) for r in roughnesses)
-        fit = nearest(looked, colors, inputs.reaches(color), _is_shown)
+        has = _shown(device.lacks_osl(lamps.current_scene()))
+        fit = nearest(looked, colors, inputs.reaches(color), has)
         if fit is None:
             raise Refused(say("this extension has no model that is near"))
         return _part(inputs, looked[0], fit), fit

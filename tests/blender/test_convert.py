@@ -97,6 +97,17 @@ def test_a_node_is_what_it_is_taken_for(extension, convert, empty, kind, distrib
 # ---- which model, and how near -------------------------------------------------------------------
 
 
+def test_the_setting_of_osl_counts_when_it_is_changed(extension, empty):
+    """Formula Nodes lack a choice of Ashikhmin and Shirley's model that plastic is nearest to."""
+    material, _ = material_of("principled", "GGX", Roughness=0.4)
+    chosen = []
+    for osl in (False, True, False):
+        empty.cycles.shading_system = osl
+        (plan,) = extension.api.plan_conversion([material])
+        chosen.append((plan.model, plan.values["diffuse"]))
+    assert chosen == [("ashikhmin_shirley", c) for c in ("paper", "tabulated", "paper")]
+
+
 def test_what_is_a_model_already_is_off_by_nothing(extension, convert):
     plan = only(convert.plan([material_of("diffuse", Color=GOLD)[0]]))
     assert plan.model == "lambert" and plan.error < 1e-6
