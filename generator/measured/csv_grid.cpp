@@ -171,10 +171,10 @@ void add_gaps(const char* name, const std::vector<double>& at, std::vector<std::
 
 Measurement read_csv_grid(const std::filesystem::path& path) {
   const std::string name = path.string();
-  std::ifstream in(path);
   std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error) || !in)
-    input_error("{}: expected a CSV file that can be read", name);
+  if (!std::filesystem::is_regular_file(path, error)) input_error("{}: expected a file, found none", name);
+  std::ifstream in(path);
+  if (!in) input_error("{}: cannot be read", name);
   const Columns kind = columns_of(name);
   const bool vectors = kind == Columns::Vectors;
   const std::vector<std::string>& columns = names_of(kind);

@@ -24,7 +24,7 @@ def _tool() -> str:
     if not found:
         raise FileNotFoundError(
             "measured BRDFs are read by the program brdfc, which is not on the path: "
-            'pip install "brdfc[tool]", or name it in the environment variable BRDFC_TOOL'
+            "install its wheel (docs/python.md), or name it in the environment variable BRDFC_TOOL"
         )
     return found
 

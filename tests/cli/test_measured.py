@@ -421,9 +421,10 @@ def test_fields_that_are_not_known_are_named(tmp_path):
     assert told(file)["notes"] == ["valid: this field is not known and was not read"]
 
 
-def test_what_is_not_there_is_said(tmp_path):
-    done = run("measured", tmp_path / "none.binary")
-    assert done.returncode == 2 and "none.binary: expected a file, found none" in done.stderr
+@pytest.mark.parametrize("name", ["none.binary", "none.bsdf", "none.bin", "none.csv"])
+def test_what_is_not_there_is_said(tmp_path, name):
+    done = run("measured", tmp_path / name)
+    assert done.returncode == 2 and f"{name}: expected a file, found none" in done.stderr
 
 
 def lobe_table(folder, matte=0.0):
