@@ -271,7 +271,7 @@ UP = [0.0, 0.0, 1.0]
 @pytest.mark.parametrize(
     ("call", "error", "words"),
     [
-        (lambda b: b.model("wart"), ValueError, "unknown model 'wart': mean ward.*ashikhmin"),
+        (lambda b: b.model("wart"), ValueError, "'wart': did you mean ward.*ashikhmin_shirley"),
         (
             lambda b: b.model("ward").eval(UP, UP, ax=2),
             ValueError,
