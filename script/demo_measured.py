@@ -24,7 +24,8 @@ import numpy as np
 import OpenImageIO as oiio
 from demo_matrix import RENDER_SCENE
 from demo_tasks import Task, TaskError, digest, run_task, write_json
-from measured_formats import merl, merl_directions, tensor
+from markdown_table import percent
+from measured_samples import MADE, make_files
 from pictures import read_rgb
 
 #: Pixels of a picture; samples a pixel in Blender, which denoises, and of the reference.
@@ -34,111 +35,6 @@ FITS = {"formula": "Nearest formula", "curves": "Curves", "lobes": "Sum of lobes
 MOST_LOBES = 4
 #: Difference in full colour, relative to the mean of the picture of the data.
 DIFFERENCE_SCALE = 0.5
-
-# ---- files -------------------------------------------------------------------------------------
-
-
-def f_of(models, wi, wo):
-    """The sum of f of models; `models` has rows (name, parameters)."""
-    import brdfc
-
-    return sum(np.asarray(brdfc.model(name).eval(wi, wo, **values)) for name, values in models)
-
-
-def direction(theta, phi):
-    """Unit vectors of angles in radians."""
-    theta, phi = np.broadcast_arrays(theta, phi)
-    s = np.sin(theta)
-    return np.stack([s * np.cos(phi), s * np.sin(phi), np.cos(theta)], -1)
-
-
-def car_paint():
-    """MERL's format, with noise of 2 % in each number."""
-    models = [
-        ("lambert", {"rho": (0.015, 0.03, 0.12)}),
-        ("microfacet", {"f0": (0.05, 0.16, 0.42), "tint": (0.3,) * 3, "ax": 0.38, "ay": 0.38}),
-        ("microfacet", {"f0": (0.06, 0.06, 0.06), "ax": 0.07, "ay": 0.07}),
-    ]
-    wi, wo = merl_directions()
-    f = f_of(models, wi, wo)
-    return merl(f * np.random.default_rng(1).normal(1, 0.02, f.shape))
-
-
-def brushed_copper():
-    """RGL's format, anisotropic: half of the azimuths, as files of that database have."""
-    models = [
-        ("microfacet", {"f0": (0.6, 0.36, 0.25), "ax": 0.07, "ay": 0.32}),
-        ("microfacet", {"f0": (0.35, 0.2, 0.13), "tint": (0.3,) * 3, "ax": 0.3, "ay": 0.6}),
-    ]
-    thetas, phis = np.radians(np.linspace(0, 86, 15)), np.linspace(-np.pi, 0, 17)
-    view = direction(thetas, phis[:, None])
-    # The coordinates of half vectors are sqrt(2 theta / pi) and the azimuth from -pi.
-    height, width = 64, 48
-    theta = np.linspace(0, 1, width) ** 2 * np.pi / 2
-    phi = np.linspace(-np.pi, np.pi, height)
-    half = direction(np.clip(theta, 1e-4, np.pi / 2 - 1e-4), phi[:, None])
-    # With constant `vndf` and `sigma`, a value is 4 f cos / ndf at the half vector itself. `ndf` is
-    # like the highlight, so the quotient is smooth and can be interpolated.
-    ndf = f_of(models, half, half).mean(-1) * half[..., 2] ** 2 + 1e-6
-    view, half = np.broadcast_arrays(view[:, :, None, None], half)
-    light = 2 * (view * half).sum(-1, keepdims=True) * half - view
-    above = light[..., 2:] > 1e-3
-    light = np.where(above, light, (0, 0, 1))
-    value = np.where(above, f_of(models, light, view) * light[..., 2:], 0) * 4 / ndf[..., None]
-    ones = np.ones((2, 2), np.float32)
-    fields = {
-        "description": np.frombuffer(b"Made of two lobes", np.uint8),
-        "jacobian": np.array([1], np.uint8),
-        "phi_i": phis,
-        "theta_i": thetas,
-        "ndf": ndf,
-        "sigma": ones,
-        "vndf": np.broadcast_to(ones, (len(phis), len(thetas), 2, 2)),
-        "rgb": np.moveaxis(value, -1, 2),
-    }
-    return tensor({k: a if a.dtype == np.uint8 else a.astype("f4") for k, a in fields.items()})
-
-
-def road_marking():
-    """A table: paint that sends a part of the light back to the lamp."""
-    models = [
-        ("lambert", {"rho": (0.3, 0.25, 0.08)}),
-        ("lafortune", {"cxy": 1, "cz": 0.9, "e": 12, "ks": (0.3, 0.25, 0.1)}),
-        ("cook_torrance", {"m": 0.2, "f0": (0.05, 0.05, 0.05)}),
-    ]
-    theta, phi = np.arange(0, 90, 3), np.arange(0, 181, 3)
-    grid = np.stack(np.meshgrid(theta, [0], theta, phi, indexing="ij"), -1).reshape(-1, 4)
-    radians = np.radians(grid)
-    f = f_of(models, direction(*radians[:, :2].T), direction(*radians[:, 2:].T))
-    rows = "".join(
-        ",".join(f"{x:.7g}" for x in row) + "\n" for row in np.concatenate([grid, f], 1).tolist()
-    )
-    return ("theta_i,phi_i,theta_o,phi_o,r,g,b\n" + rows).encode()
-
-
-#: The made files: what they are for the page, and what makes them.
-MADE = {
-    "car-paint.binary": (
-        "Blue paint with flakes under a clear coat, in MERL's format, with noise of 2 %",
-        car_paint,
-    ),
-    "brushed-copper.bsdf": (
-        "Brushed copper with a wide glow, anisotropic, in RGL's format",
-        brushed_copper,
-    ),
-    "road-marking.csv": ("Paint that sends light back to the lamp, as a table", road_marking),
-}
-
-
-def make_files(out):
-    for name, (_, make) in MADE.items():
-        file = out / "files" / name
-        file.parent.mkdir(parents=True, exist_ok=True)
-        data = make()
-        if not file.is_file() or file.read_bytes() != data:
-            file.write_bytes(data)
-        yield file
-
 
 # ---- fits --------------------------------------------------------------------------------------
 
@@ -241,8 +137,8 @@ class Demo:
         return run_task(task)
 
     def fit(self):
-        """Fills `told`, what the tool says of the file; `materials` and `misplaced` by fit; and
-        `seconds` from the file to the fit."""
+        """Fills `told`, what the tool says of the file, and `kind`, what the file is; `materials`
+        and `misplaced` by fit; and `seconds` from the file to the fit."""
         command = [self.options.tool, "measured", self.file, "--json"]
         curves = ("--models", "factors")
         lobes = ("--lobes", MOST_LOBES)
@@ -251,8 +147,10 @@ class Demo:
             for name, extra in (("formula", ()), ("curves", curves), ("lobes", lobes))
         }
         found = {name: record["records"] for name, record in records.items()}
-        self.told = found["formula"]
-        formula = next(f for f in self.told["fits"] if f["model"] != "factors")
+        told = self.told = found["formula"]
+        isotropic = "isotropic" if told["isotropic"] else "anisotropic"
+        self.kind = f"{told['format']}, {isotropic}, {told['grid']}"
+        formula = next(f for f in told["fits"] if f["model"] != "factors")
         (curves,) = found["curves"]["fits"]
         if not found["lobes"]["sums"]:
             raise TaskError(f"{self.file}: expected data that reflect light, found black ones")
@@ -346,10 +244,6 @@ code { font-size: .85em; }
 OSL = {True: "Open Shading Language on", False: "Open Shading Language off"}
 
 
-def percent(share):
-    return f"{100 * share:.2g} %"
-
-
 def write_png(exr):
     """The picture beside it, as a display shows it."""
     pixels = np.clip(read_rgb(exr), 0, 1).astype("f4")
@@ -370,9 +264,7 @@ def section(demo):
     def row(title, cells, tag="td"):
         return f"<tr><th>{title}</th>" + "".join(f"<{tag}>{c}</{tag}>" for c in cells) + "</tr>\n"
 
-    told = demo.told
-    kind = "isotropic" if told["isotropic"] else "anisotropic"
-    facts = [f"{told['format']}, {kind}, {told['grid']}.", *told["notes"], *told["lacks"]]
+    facts = [f"{demo.kind}.", *demo.told["notes"], *demo.told["lacks"]]
     rows = [row("", ["Data", *FITS.values()], "th")]
     rows.append(row("Misplaced light", ["", *(percent(demo.misplaced[n]) for n in FITS)]))
     for osl, words in OSL.items():
@@ -478,9 +370,7 @@ def parse():
 
 
 def print_fits(demo):
-    told = demo.told
-    kind = "isotropic" if told["isotropic"] else "anisotropic"
-    print(f"    {demo.file.name}: {told['format']}, {kind}, {told['grid']}")
+    print(f"    {demo.file.name}: {demo.kind}")
     for name, title in FITS.items():
         off, seconds = percent(demo.misplaced[name]), demo.seconds[name]
         print(f"      {title.lower():<16} misplaces {off:>7} of the light, after {seconds:4.1f} s")

@@ -13,6 +13,13 @@ def unit(v):
     return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
+def direction(theta, phi):
+    """Unit vectors of angles in radians."""
+    theta, phi = np.broadcast_arrays(theta, phi)
+    s = np.sin(theta)
+    return np.stack([s * np.cos(phi), s * np.sin(phi), np.cos(theta)], -1)
+
+
 def merl_directions():
     """wi, wo (90 * 90 * 180, 3) in the middle of each cell, of half vectors with azimuth 0."""
     h, d, p = ((np.arange(n) + 0.5) / n for n in MERL)

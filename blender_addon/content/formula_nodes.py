@@ -1,212 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Builds a model's formulas from Blender's own Math nodes, which Cycles runs on every device.
 
-The tool writes formulas as lists of operations, in the extension's nodes/*.json. Here each list
-becomes a node group. The groups are wired to the surface frame, to the lamps and to the closures
-that carry the result: a Toon BSDF for each lamp, one for a random direction, and Blender's own
-nodes for ideal reflection and refraction.
+The tool writes formulas as lists of operations, in the extension's nodes/*.json, of which
+part_groups.py makes node groups. Here these are wired to the surface frame, to the lamps and to the
+closures that carry the result: a Toon BSDF for each lamp, one for a random direction, and Blender's
+own nodes for ideal reflection and refraction.
 """
 
-import hashlib
-import json
 import math
 
-import bpy
-
-from . import kept_groups, svm_constants
+from . import svm_constants
+from .part_groups import Parts, add_group, make_group
 from .wiring import Wiring
-
-#: Custom property of a part's group: hash of its operations. Equal parts share one group.
-PART = "brdfc_part"
-_SOCKETS = {
-    "FLOAT": "NodeSocketFloat",
-    "VECTOR": "NodeSocketVector",
-    "SHADER": "NodeSocketShader",
-}
-#: The only vector operation with a scalar result.
-_DOT = "V_DOT_PRODUCT"
-#: Maximum number of operations in a group.
-_STEP = 60
-
-
-class _Formula:
-    """Adds the nodes for a list of operations."""
-
-    def __init__(self, wiring, inputs):
-        self.w, self.inputs = wiring, inputs
-        self.results, self.parts = [], {}
-
-    def operand(self, value, vector=False):
-        if isinstance(value, str):
-            return self.results[int(value[1:])] if value[0] == "$" else self.inputs[value]
-        return (value,) * 3 if vector and not isinstance(value, list) else value
-
-    def add(self, kind, *operands):
-        w = self.w
-        if kind in ("X", "Y", "Z"):
-            (source,) = operands
-            if source not in self.parts:
-                node = w.node("ShaderNodeSeparateXYZ")
-                w.give(node.inputs[0], self.operand(source))
-                self.parts[source] = node.outputs
-            return self.parts[source][kind]
-        if kind == "COMBINE":
-            node = w.node("ShaderNodeCombineXYZ")
-            for socket, value in zip(node.inputs, operands, strict=True):
-                w.give(socket, self.operand(value))
-            return node.outputs[0]
-        if kind in ("MIX", "V_MIX"):
-            vector = kind == "V_MIX"
-            at_0, at_1 = (self.operand(o, vector) for o in operands[1:])
-            return w.mix(self.operand(operands[0]), at_0, at_1, vector)
-        if kind == "V_SCALE":
-            return w.scaled(self.operand(operands[0], True), self.operand(operands[1]))
-        if kind == _DOT:
-            return w.vector(kind[2:], *(self.operand(o, True) for o in operands), output="Value")
-        if kind.startswith("V_"):
-            return w.vector(kind[2:], *(self.operand(o, True) for o in operands))
-        return w.math(kind, *map(self.operand, operands))
-
-    def wire(self, data):
-        for operation in data["operations"]:
-            self.results.append(self.add(*operation))
-        return {
-            name: self.operand(value, kind == "VECTOR") for name, kind, value in data["outputs"]
-        }
-
-
-def _find(digest, among=None):
-    for group in bpy.data.node_groups if among is None else among:
-        if group.library is None and group.get(PART) == digest:
-            return group
-    return None
-
-
-def _appended(digest):
-    """The kept group of a part, or None. If the file already has an equal part, that one stays."""
-    made = kept_groups.append(digest)
-    wanted = _find(digest, made)
-    own = [group for group in bpy.data.node_groups if group not in made]
-    for group in made:
-        if wanted is None:
-            bpy.data.node_groups.remove(group)
-        elif other := _find(group.get(PART), own):
-            group.user_remap(other)
-            bpy.data.node_groups.remove(group)
-    return wanted
-
-
-def _group(title, content, inputs, outputs, fill, kept=False):
-    """Finds or makes the group with this content. `inputs` and `outputs`: names and kinds;
-    fill(wiring, inputs by name) returns the outputs by name. `kept`: see kept_groups."""
-    content = [kept_groups.version(), content]
-    digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
-    if group := _find(digest) or (_appended(digest) if kept else None):
-        return group
-    group = bpy.data.node_groups.new(f"brdfc {title}", "ShaderNodeTree")
-    group[PART] = digest
-    for in_out, sockets in (("INPUT", inputs), ("OUTPUT", outputs)):
-        for name, kind in sockets:
-            group.interface.new_socket(name, in_out=in_out, socket_type=_SOCKETS[kind])
-    w = Wiring(group)
-    start = w.node("NodeGroupInput")
-    made = fill(w, {s.name: s for s in start.outputs if s.name})
-    end = w.node("NodeGroupOutput")
-    for name, value in made.items():
-        w.give(end.inputs[name], value)
-    w.place_nodes()
-    if kept:
-        kept_groups.keep(group, digest)
-    return group
-
-
-def _instance(w, group, inputs, label):
-    """Adds a group node to a tree; returns its outputs by name."""
-    node = w.node("ShaderNodeGroup")
-    node.node_tree = group
-    node.label = label
-    for socket in node.inputs:
-        w.give(socket, inputs[socket.name])
-    return {socket.name: socket for socket in node.outputs}
-
-
-def _steps(data):
-    """Splits a long list of operations into short ones, each taking the results of those before it:
-    Blender's time for each new link grows with the size of the tree."""
-    operations = data["operations"]
-    kinds = dict(data["inputs"])
-    for index, (kind, *_) in enumerate(operations):
-        vector = kind == "COMBINE" or (kind.startswith("V_") and kind != _DOT)
-        kinds[f"${index}"] = "VECTOR" if vector else "FLOAT"
-    wanted = [value for _, _, value in data["outputs"] if isinstance(value, str)]
-    for first in range(0, len(operations), _STEP):
-        last = min(first + _STEP, len(operations))
-        here = operations[first:last]
-        own = {f"${i}" for i in range(first, last)}
-        taken = list(dict.fromkeys(o for op in here for o in op[1:] if isinstance(o, str)))
-        later = {o for op in operations[last:] for o in op[1:] if isinstance(o, str)} | {*wanted}
-        given = [name for name in sorted(own, key=lambda n: int(n[1:])) if name in later]
-        names = {f"${first + i}": f"${i}" for i in range(len(here))}
-        names |= {o: f"before_{o[1:]}" for o in taken if o[0] == "$" and o not in own}
-        yield {
-            "inputs": [[names.get(o, o), kinds[o], o] for o in taken if o not in own],
-            "operations": [
-                [kind, *(names.get(o, o) if isinstance(o, str) else o for o in operands)]
-                for kind, *operands in here
-            ],
-            "outputs": [[f"result_{o[1:]}", kinds[o], names[o], o] for o in given],
-        }
-
-
-def _part_group(title, data):
-    """The node group of a part."""
-    inputs = data["inputs"]
-    outputs = [output[:2] for output in data["outputs"]]
-    if len(data["operations"]) <= _STEP:
-        return _group(title, data, inputs, outputs, lambda w, given: _Formula(w, given).wire(data))
-
-    def fill(w, given):
-        known = dict(given)
-        for step in _steps(data):
-            short = {
-                "inputs": [entry[:2] for entry in step["inputs"]],
-                "operations": step["operations"],
-                "outputs": [entry[:3] for entry in step["outputs"]],
-            }
-            group = _part_group(title, short)
-            made = _instance(w, group, {e[0]: known[e[2]] for e in step["inputs"]}, "")
-            known |= {e[3]: made[e[0]] for e in step["outputs"]}
-        return {
-            name: known[value] if isinstance(value, str) else value
-            for name, _, value in data["outputs"]
-        }
-
-    return _group(title, data, inputs, outputs, fill)
-
-
-class _Parts:
-    """The parts of a model, which add themselves as nodes to its group."""
-
-    def __init__(self, wiring, parts, title, constants):
-        """`constants`: the outputs of svm_constants.add_values()."""
-        self.w, self.data, self.title, self.constants = wiring, parts, title, constants
-
-    def has(self, name):
-        return name in self.data
-
-    def add(self, name, **inputs):
-        """Adds a part; returns its outputs by name. `inputs`: numbers and outputs by name."""
-        group = _part_group(f"{self.title}: {name}", self.data[name])
-        return _instance(self.w, group, self.constants | inputs, name)
-
-    def inputs(self, name):
-        """Names and kinds of a part's inputs."""
-        return {name: kind for name, kind in self.data[name]["inputs"]}
-
-    def on(self, wiring, found):
-        """The same parts in another tree, whose group inputs are `found`."""
-        constants = {name: found[name] for name in svm_constants.VALUES if name in found}
-        return _Parts(wiring, self.data, self.title, constants)
 
 
 class _Surface:
@@ -341,7 +146,7 @@ def _seen_group(parts):
 
     content = ["seen", parts.data["axes"], parts.data["cone"]]
     inputs = [[name, "VECTOR"] for name in vectors]
-    return _group("lamp seen", content, inputs, _SEEN + _AXES, fill)
+    return make_group("lamp seen", content, inputs, _SEEN + _AXES, fill)
 
 
 def _point_of(w, towards, drop, anywhere, u):
@@ -381,7 +186,7 @@ def _lamp_group(parts):
         return {"BSDF": w.shown(found["lit"], toon)}
 
     content = ["lamp", {name: parts.data[name] for name in ("value", "flat", "lobe")}]
-    return _group(f"{parts.title}: lamp", content, inputs, [["BSDF", "SHADER"]], fill)
+    return make_group(f"{parts.title}: lamp", content, inputs, [["BSDF", "SHADER"]], fill)
 
 
 def _keep_apart(w, lamps, widest):
@@ -437,9 +242,9 @@ def wire(tree, data, normal, tangent, parameters, slots, title):
 
     inputs = [[name, kind] for name, (_, kind) in values.items()]
     outputs = [["BSDF", "SHADER"], *([] if "draw" in data["parts"] else [["Albedo", "VECTOR"]])]
-    group = _group(f"{title}: formulas", [data, inputs], inputs, outputs, fill, kept=True)
+    group = make_group(f"{title}: formulas", [data, inputs], inputs, outputs, fill, kept=True)
     w = Wiring(tree)
-    made = _instance(w, group, {name: value for name, (value, _) in values.items()}, "Formulas")
+    made = add_group(w, group, {name: value for name, (value, _) in values.items()}, "Formulas")
     w.place_nodes()
     return made
 
@@ -449,7 +254,7 @@ def _wired(w, data, normal, tangent, parameters, slots, title):
     geometry = w.node("ShaderNodeNewGeometry")
     constants = svm_constants.add_values(w, geometry.outputs["Backfacing"])
     lists = {name: svm_constants.prepared(name, part) for name, part in data["parts"].items()}
-    parts = _Parts(w, lists, title, constants)
+    parts = Parts(w, lists, title, constants)
     parameters = dict(parameters)
     for name, (low, high) in data["bounds"].items():
         inside = w.math("MAXIMUM", parameters[name], low)
@@ -496,11 +301,11 @@ def _wired(w, data, normal, tangent, parameters, slots, title):
         seen, lit = _seen_group(parts), _lamp_group(parts)
         for slot in slots:
             values = dict(zip(_SLOT, slot, strict=True))
-            lamps.append(values | _instance(w, seen, here | values, "lamp seen"))
+            lamps.append(values | add_group(w, seen, here | values, "lamp seen"))
         _keep_apart(w, lamps, data["widest"])
     shaders.append(_rest(w, parts, surface, given, lamps, data["narrow"]))
     for lamp in lamps:
-        shaders.append(_instance(w, lit, given | lamp, "lamp")["BSDF"])
+        shaders.append(add_group(w, lit, given | lamp, "lamp")["BSDF"])
     return {"BSDF": w.sum(shaders)}
 
 
@@ -540,16 +345,3 @@ def _rest(w, parts, surface, given, lamps, narrow):
 def numbers(constants):
     """The parameter values that formulas take as numbers, that is, all but choices."""
     return {name: value for name, value in constants.items() if not isinstance(value, str)}
-
-
-def _unused():
-    for group in bpy.data.node_groups:
-        if group.library is None and PART in group and group.users == 0:
-            return group
-    return None
-
-
-def remove_unused_parts():
-    """Removes the part groups that no model uses from the file."""
-    while group := _unused():
-        bpy.data.node_groups.remove(group)

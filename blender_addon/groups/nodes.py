@@ -13,7 +13,7 @@ import bpy
 from .. import lamps
 from ..common import editable
 from ..common.i18n import say
-from ..content import formula_nodes, group_content, stand_in
+from ..content import group_content, part_groups, stand_in
 from ..content.group_content import ALBEDO, has_albedo_script, is_native, script_problem
 from ..packs import device, pack
 from ..packs.pack import choice_label
@@ -479,8 +479,8 @@ def make_local(tree):
     for node in tree.nodes:
         for name in ("node_tree", "script", "image"):
             inner = getattr(node, name, None)
-            if inner is not None and not editable.keeps_changes(inner):
-                setattr(node, name, editable.local(inner))
+            if inner is not None and (own := editable.local(inner)) != inner:
+                setattr(node, name, own)
         if getattr(node, "node_tree", None) is not None:
             make_local(node.node_tree)
 
@@ -520,7 +520,7 @@ def _clear_away(uids, texts):
     # Removing a group may leave further ones without a user.
     while unused := [g for g in bpy.data.node_groups if g.session_uid in uids and g.users == 0]:
         remove_group(unused[0])
-    formula_nodes.remove_unused_parts()
+    part_groups.remove_unused_parts()
     lamps.remove_unused_group()
 
 

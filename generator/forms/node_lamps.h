@@ -122,10 +122,19 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& slot, const LampAxes<T
   return cone;
 }
 
+/// The solid angle that a point of a rectangle or an ellipse stands for, divided by `of_cone`, that of the cone within
+/// the lamp. `cosine`: between `away` and the direction to the point, whose squared distance is given.
+template <class T>
+T emphasis_at(const LampSlot<T>& slot, const LampAxes<T>& lamp, const T& cosine, const T& distance2, const T& of_cone) {
+  const auto round = slot.shape.x > T(3.5);
+  const T area = lamp.half_across * lamp.half_along * select(round, T(kPi), T(4));
+  return area * cosine / (distance2 * of_cone);
+}
+
 /// A point of a rectangle or an ellipse, chosen by two numbers in [0, 1).
 template <class T> struct FlatPoint {
   Vec3<T> wi;  ///< unit vector to the point
-  T emphasis;  ///< solid angle that the point stands for, divided by that of the cone within the lamp
+  T emphasis;  ///< emphasis_at() the point
 };
 template <class T> FlatPoint<T> flat_point(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
                                            const T& drop, const T& u, const T& v) {
@@ -135,15 +144,15 @@ template <class T> FlatPoint<T> flat_point(const LampSlot<T>& slot, const LampAx
   const T y = select(round, radius * sin(turn), T(2) * v - T(1));
   const Vec3<T> p = lamp.across * (lamp.half_across * x) + lamp.along * (lamp.half_along * y) + (slot.place - at);
   const T distance2 = dot(p, p);
-  const T area = lamp.half_across * lamp.half_along * select(round, T(kPi), T(4)) * T(1 / (2 * kPi));
   FlatPoint<T> out;
   out.wi = p * (T(1) / sqrt(distance2));
-  out.emphasis = maximum(area * dot(lamp.away, out.wi), T(0)) / (distance2 * drop);
+  const T cosine = maximum(dot(lamp.away, out.wi), T(0));
+  out.emphasis = emphasis_at(slot, lamp, cosine, distance2, drop * T(2 * kPi));
   return out;
 }
 
 /// The part of f cos in one direction that the lamp's closure carries; the drawn direction carries the rest of it.
-/// `density`: pdf of drawn directions there. `emphasis`: see FlatPoint, 1 for a ball or a sun.
+/// `density`: pdf of drawn directions there. `emphasis`: 1 for a ball or a sun.
 template <class T> T part_of_lamp(const LampCone<T>& cone, const T& emphasis, const T& density) {
   // The point of a rectangle has the pdf 1 / (solid_angle emphasis), and since Cycles samples all of the rectangle,
   // only one sample in `emphasis` meets its cone.
@@ -164,8 +173,7 @@ template <class T> T met_part(const LampSlot<T>& slot, const LampAxes<T>& lamp, 
   const T farthest = select(round, maximum(x, T(0)) * x + maximum(y, T(0)) * y, maximum(x, y));
   const auto on_flat = farthest < T(1) && T(0) < slope;
   const T met = select(flat, select(on_flat, T(1), T(0)), select(length(ray - cone.towards) < cone.chord, T(1), T(0)));
-  const T area = lamp.half_across * lamp.half_along * select(round, T(kPi), T(4));
-  const T emphasis = area * slope / (sqr(distance) * cone.solid_angle);
+  const T emphasis = emphasis_at(slot, lamp, slope, sqr(distance), cone.solid_angle);
   return met * part_of_lamp(cone, select(flat, emphasis, T(1)), density);
 }
 
@@ -188,8 +196,8 @@ template <class T> struct ToonLobe {
 template <class T> ToonLobe<T> toon_lobe(const LampCone<T>& cone, const T& emphasis, const T& density, const T& room,
                                          const Rgb<T>& value, const T& u) {
   constexpr double kWidened = 2e-4;
-  const T factor = emphasis * cone.whole * part_of_lamp(cone, emphasis, density),
-          largest = max_component(value) * factor;
+  const T factor = emphasis * cone.whole * part_of_lamp(cone, emphasis, density);
+  const T largest = max_component(value) * factor;
   const T wide = minimum(sqrt(T(kWidened / kPi) / largest), room);
   const T chord = maximum(cone.chord, select(cone.flat > T(0.5), T(0), wide)), chord2 = chord * chord;
   const T extent = chord2 * T(kPi);

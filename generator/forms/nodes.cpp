@@ -129,9 +129,8 @@ NodeRecording record_nodes(const Model& model, const ParamValues& fixed) {
   out.value.output("value", base.empty() ? f : f - evaluate(base, wi, wo));
   out.value.output("density", brdf->pdf(wi, wo));
   const Under* of = base.empty() ? nullptr : under(model);
-  const bool beside = of && of->sample;
-  const Sample<Expr> s = beside ? of->sample(model.info(), fixed, wo, recorded_u(), Expr::input("stands"))
-                                : brdf->sample(wo, recorded_u());
+  const Sample<Expr> s = of && of->sample ? of->sample(model.info(), fixed, wo, recorded_u(), Expr::input("stands"))
+                                          : brdf->sample(wo, recorded_u());
   out.draw.output("wi", s.wi);
   out.draw.output("weight", base.empty() ? s.weight : s.weight - evaluate(base, s.wi, wo) / s.pdf);
   if (model.has_mirror()) {

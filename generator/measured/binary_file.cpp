@@ -3,12 +3,19 @@
 
 namespace brdfc::measured {
 
-BinaryFile::BinaryFile(const std::filesystem::path& path) : name_(path.string()) {
+std::ifstream open_file(const std::filesystem::path& path, std::ios::openmode mode) {
   std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) input_error("{}: expected a file, found none", name_);
-  in_.open(path, std::ios::binary);
+  if (!std::filesystem::is_regular_file(path, error)) input_error("{}: expected a file, found none", path.string());
+  std::ifstream in(path, mode);
+  if (!in) input_error("{}: cannot be read", path.string());
+  return in;
+}
+
+BinaryFile::BinaryFile(const std::filesystem::path& path)
+    : name_(path.string()), in_(open_file(path, std::ios::binary)) {
+  std::error_code error;
   size_ = std::filesystem::file_size(path, error);
-  if (!in_ || error) input_error("{}: cannot be read", name_);
+  if (error) input_error("{}: cannot be read", name_);
 }
 
 void BinaryFile::seek(std::uint64_t place) {

@@ -15,9 +15,12 @@ namespace brdfc::measured {
 
 static_assert(std::endian::native == std::endian::little, "the formats are little-endian, and bytes are not swapped");
 
+/// Throws InputError if the path is not a file that can be read.
+std::ifstream open_file(const std::filesystem::path&, std::ios::openmode = std::ios::in);
+
 class BinaryFile {
  public:
-  /// Throws InputError if the path is not a file that can be read.
+  /// See open_file().
   explicit BinaryFile(const std::filesystem::path& path);
 
   const std::string& name() const { return name_; }

@@ -10,6 +10,7 @@
 
 #include "core/csv.h"
 #include "core/error.h"
+#include "measured/binary_file.h"
 #include "measured/grid_table.h"
 
 namespace brdfc::measured {
@@ -171,10 +172,7 @@ void add_gaps(const char* name, const std::vector<double>& at, std::vector<std::
 
 Measurement read_csv_grid(const std::filesystem::path& path) {
   const std::string name = path.string();
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) input_error("{}: expected a file, found none", name);
-  std::ifstream in(path);
-  if (!in) input_error("{}: cannot be read", name);
+  std::ifstream in = open_file(path);
   const Columns kind = columns_of(name);
   const bool vectors = kind == Columns::Vectors;
   const std::vector<std::string>& columns = names_of(kind);

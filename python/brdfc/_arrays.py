@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ._formula import multilinear
-from ._model import Choice, Color, Model, Sample, real, sequence
+from ._model import LOST, Choice, Color, Model, Sample, real, sequence
 
 Array = Any
 
@@ -283,9 +283,7 @@ class ArrayModel:
         np.rank = len(shape)
         whole = {"r": shape, "c": (3, *shape)}
         if formula is None:
-            # Every sample is lost; the direction is one all the same.
-            constant = [1.0 if what == "sample" and i == 2 else 0.0 for i in range(len(kinds))]
-            results = [np.array(x) for x in constant]
+            results = [np.array(x) for x in (LOST if what == "sample" else [0.0] * len(kinds))]
         else:
             arguments, below = [], []
             for name, v in zip(vectors, directions, strict=True):
@@ -315,7 +313,7 @@ class ArrayModel:
             results = formula(np, *arguments)
             results = results if len(kinds) > 1 else (results,)
             if lost is not None:
-                instead = (0.0, 0.0, 1.0, 0.0, 0.0) if what == "sample" else (0.0,)
+                instead = LOST if what == "sample" else (0.0,)
                 results = [
                     np.where(lost, value, r) for value, r in zip(instead, results, strict=True)
                 ]

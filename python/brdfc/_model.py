@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 #: Points that a formula takes at a time: what it holds between two steps then stays in the cache.
 BLOCK = 8192
 
+#: A sample that is lost: the direction, the weight and the pdf.
+LOST = (0.0, 0.0, 1.0, 0.0, 0.0)
+
 Array = NDArray[np.float64]
 
 
@@ -315,10 +318,7 @@ class Model:
         )
         size = int(np.prod(shape))
         out = [np.zeros((3, size) if k == "c" else size) for k in kinds]
-        if formula is None:
-            if what == "sample":
-                out[2][:] = 1.0  # every sample is lost; the direction is one all the same
-        else:
+        if formula is not None:
             arguments = [
                 np.broadcast_to(v[..., i], shape).reshape(size) for v in vectors for i in range(3)
             ]
@@ -346,10 +346,11 @@ class Model:
                         out, results if len(out) > 1 else (results,), strict=True
                     ):
                         array[..., block] = result
-        if what == "sample" and not self.two_sided:
-            # Every sample is lost, and formulas may have no direction there.
-            lost = np.broadcast_to(vectors[0][..., 2] <= 0, shape).reshape(size)
-            for array, value in zip(out, (0.0, 0.0, 1.0, 0.0, 0.0), strict=True):
+        if what == "sample" and (formula is None or not self.two_sided):
+            # Below the surface formulas may have no direction.
+            below = np.broadcast_to(vectors[0][..., 2] <= 0, shape).reshape(size)
+            lost = slice(None) if formula is None else below
+            for array, value in zip(out, LOST, strict=True):
                 array[..., lost] = value
         for array in out:
             if not np.isfinite(array).all():

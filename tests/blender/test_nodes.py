@@ -304,7 +304,7 @@ def test_a_group_a_model_and_none_that_is_left(extension, empty):
     assert len(bpy.data.node_groups) == before
     for material in (first, second):
         extension.api.switch_representation(material, "aimed")
-    assert not [g for g in bpy.data.node_groups if extension.nodes.formula_nodes.PART in g]
+    assert not [g for g in bpy.data.node_groups if extension.nodes.part_groups.PART in g]
     assert sorted(g.name for g in bpy.data.node_groups if "Phong" in g.name) == [
         "Phong (aimed)",
         "Phong (twin)",

@@ -13,7 +13,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from measured_formats import tensor
+from measured_formats import direction, tensor
 
 GOLDEN = Path(__file__).with_name("measured_golden.csv")
 
@@ -28,12 +28,8 @@ def hemisphere(count, seed, lowest=0.02):
 
 
 def utia_directions():
-    theta, phi = np.meshgrid(
-        np.radians(np.arange(0, 76, 15)), np.radians(np.arange(0, 360, 7.5)), indexing="ij"
-    )
-    w = np.stack(
-        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1
-    ).reshape(-1, 3)
+    theta, phi = np.radians(np.arange(0, 76, 15)), np.radians(np.arange(0, 360, 7.5))
+    w = direction(theta[:, None], phi).reshape(-1, 3)
     return np.repeat(w, len(w), 0), np.tile(w, (len(w), 1))
 
 

@@ -198,7 +198,7 @@ def test_samples_below_the_surface_are_lost(brdfc, name):
         assert np.isfinite(s.wi).all() and np.isfinite(s.weight).all()
         return
     assert (s.wi == [0, 0, 1]).all() and not s.weight.any() and not s.pdf.any()
-    if model.formulas[next(iter(model.formulas))].sample is not None:
+    if next(iter(model.formulas.values())).sample is not None:
         found = tool("sample", name, {}, np.hstack([wo, u]), "wo_x,wo_y,wo_z,u1,u2,u3")
         assert (found == [0, 0, 1, 0, 0, 0, 0]).all()
 

@@ -7,9 +7,11 @@ import subprocess
 import sys
 
 import demo_measured
+import measured_samples
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from measured_formats import direction
 from support import ROOT, TOOL, run
 
 DEMO = ROOT / "script" / "demo"
@@ -26,11 +28,9 @@ print(json.dumps([job | keys for job in jobs]))
 """
 
 
-def direction(random, count):
+def above(random, count):
     z = random.uniform(0.3, 1, count)
-    phi = random.uniform(-np.pi, np.pi, count)
-    s = np.sqrt(1 - z * z)
-    return np.stack([s * np.cos(phi), s * np.sin(phi), z], -1)
+    return direction(np.arccos(z), random.uniform(-np.pi, np.pi, count))
 
 
 def test_the_made_copper_is_what_it_is_made_of(tmp_path, monkeypatch):
@@ -40,14 +40,14 @@ def test_the_made_copper_is_what_it_is_made_of(tmp_path, monkeypatch):
     for name in [n for n in sys.modules if n.split(".")[0] == "brdfc"]:
         monkeypatch.delitem(sys.modules, name)
     seen = []
-    of_models = demo_measured.f_of
+    of_models = measured_samples.f_of
     monkeypatch.setattr(
-        demo_measured, "f_of", lambda models, *w: seen.append(models) or of_models(models, *w)
+        measured_samples, "f_of", lambda models, *w: seen.append(models) or of_models(models, *w)
     )
     file = tmp_path / "copper.bsdf"
-    file.write_bytes(demo_measured.brushed_copper())
+    file.write_bytes(measured_samples.brushed_copper())
     random = np.random.default_rng(1)
-    wi, wo = direction(random, 500), direction(random, 500)
+    wi, wo = above(random, 500), above(random, 500)
     rows = "".join(",".join(map(str, [*a, *b])) + "\n" for a, b in zip(wi, wo, strict=True))
     command = [TOOL, "measured", file, "--pairs"]
     pairs = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z\n" + rows
@@ -106,8 +106,8 @@ def test_a_page_of_a_file(tmp_path, demo):
     program."""
     theta, phi = np.arange(0, 90, 10), np.arange(0, 181, 20)
     grid = np.stack(np.meshgrid(theta, [0], theta, phi, indexing="ij"), -1).reshape(-1, 4)
-    wi = demo_measured.direction(*np.radians(grid[:, :2]).T)
-    wo = demo_measured.direction(*np.radians(grid[:, 2:]).T)
+    wi = direction(*np.radians(grid[:, :2]).T)
+    wo = direction(*np.radians(grid[:, 2:]).T)
     half = wi + wo
     cosine = half[:, 2] / np.linalg.norm(half, axis=-1)
     back = np.clip((wi * wo).sum(-1), 0, 1)
