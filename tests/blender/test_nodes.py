@@ -151,8 +151,8 @@ def test_a_white_world(extension, model, values):
 def test_lamps(extension, model, values, light):
     """Blocks of a ball equal those of the aimed form, which was compared with the reference
     renderer: no lamp counts twice, and none is lost."""
-    forms = {"nodes": 128, "aimed": 128}
-    a, b = (blocks_of(extension, model, values, f, light, n) for f, n in forms.items())
+    # Of six pictures a few blocks with a rare bright dot decide the variance.
+    a, b = (blocks_of(extension, model, values, f, light, 128, 12) for f in ("nodes", "aimed"))
     off, error, noise = difference(a, b)
     print(f"{model}: {100 * off:+.2f} ± {100 * error:.2f} %, blocks {noise:.2f}")
     assert abs(off) < 4.5 * error + 5e-3
