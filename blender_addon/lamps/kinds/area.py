@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from .. import slots
-from .light import ASIDE, Light, seen_from
+from .light import ASIDE, Light, keeps_its_place, seen_from
 
 
 def _is_round(light):
@@ -31,6 +31,17 @@ class Area(Light):
         # shape is above a whole one.
         spread = slots.Driven(light, "spread", -0.5 / math.pi, shape + 0.5)
         return slots.numbers(spread, *placed, sizes)
+
+    def sheet(self, item, light, matrix):
+        axes = np.array([column.normalized() for column in matrix.to_3x3().transposed()])
+        scaled = (
+            getattr(light, side) * abs(scale)
+            for side, scale in zip(self.sizes(light), matrix.to_scale(), strict=False)
+        )
+        centre, stays = np.array(matrix.translation), item is None or keeps_its_place(item)
+        if slots.is_sheared(matrix):
+            return None
+        return slots.Sheet(centre, axes, tuple(scaled), not _is_round(light), stays)
 
     def irradiance(self, light, matrix, power, points):
         squared, along = seen_from(points, matrix)
