@@ -40,15 +40,20 @@ def _no_limit(scene):
     return None
 
 
-_room = _no_limit
+def _always():
+    return True
 
 
-def limit_by(lamps_that_fit):
-    """Sets the function that counts how many lamps the open file's materials can aim at on a
-    scene's device: given the scene, it returns a tuple that begins with the number, or None. It
-    looks into groups, which are made of this package."""
-    global _room
-    _room = lamps_that_fit
+_room, _are_codes_read = _no_limit, _always
+
+
+def ask(lamps_that_fit, are_codes_read):
+    """Sets two functions that look into groups, which are made of this package. lamps_that_fit()
+    counts how many lamps the open file's materials can aim at on a scene's device: given the scene,
+    it returns a tuple that begins with the number, or None. are_codes_read(): whether all materials
+    of the open file read slots.coded(), which those of older versions don't."""
+    global _room, _are_codes_read
+    _room, _are_codes_read = lamps_that_fit, are_codes_read
 
 
 def _most(scene):
@@ -103,7 +108,10 @@ def _planes(chosen):
 
 def _numbers(chosen, most):
     """The numbers of the slots of the chosen lamps."""
-    found = zip(chosen, _parts(chosen, most), _planes(chosen), strict=True)
+    parts, planes = _parts(chosen, most), _planes(chosen)
+    if (max(parts, default=1) > 1 or any(planes)) and not _are_codes_read():
+        return [c.values for c in chosen]
+    found = zip(chosen, parts, planes, strict=True)
     return [slots.coded(c.values, parts, plane) for c, parts, plane in found]
 
 
