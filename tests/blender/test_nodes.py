@@ -220,7 +220,7 @@ def test_noise_of_a_strip(extension):
 
     found = relative_variance(extension, strip)
     print(f"{found:.2e}")
-    # See test_noise_under_a_rectangle(); with a single cone it is 2.6 times this limit.
+    # See test_noise_under_a_rectangle(); with a single cone it is 1.6 times this limit.
     assert found < 4 * 0.23 / (16 * BLOCK**2), found
 
 
