@@ -71,11 +71,11 @@ def _source(socket):
 def _replace(p, parts):
     node = p.node
     groups = [_add(p, prepared) for prepared in parts]
-    group, *metal = groups
+    group, *others = groups
     group[BEFORE] = node.name
-    for other in metal:
+    for i, other in enumerate(others):
         other[HELPS] = group.name
-        other.location.y -= 300
+        other.location.y -= 300 * (i + 1)
     shader = _joined(p, groups)
     for link in [link for link in node.outputs[0].links if shader_trees.counts(link)]:
         target = link.to_socket
@@ -106,17 +106,19 @@ def _add(p, prepared):
 
 def _joined(p, groups):
     """The shader that replaces a node: its models, and the node's effects that they lack."""
-    shader, *metal = (group.outputs["BSDF"] for group in groups)
-    if metal:
-        shader = _mix(p, groups[0], "Metallic", shader, metal[0])
+    shader, *others = (group.outputs["BSDF"] for group in groups)
+    if p.base:
+        left = _helper(p, groups[0], "ShaderNodeMixShader")
+        p.material.node_tree.links.new(_rest(p, groups[0]), left.inputs[0])
+        p.material.node_tree.links.new(others[0], left.inputs[2])
+        shader = _sum(p, groups[0], shader, left.outputs[0])
+    if p.metal:
+        shader = _mix(p, groups[0], "Metallic", shader, others[-1])
     if p.glows:
         emission = _helper(p, groups[0], "ShaderNodeEmission")
         for name, socket in (("Color", "Emission Color"), ("Strength", "Emission Strength")):
             _give(p, emission.inputs[name], socket)
-        add = _helper(p, groups[0], "ShaderNodeAddShader")
-        p.material.node_tree.links.new(shader, add.inputs[0])
-        p.material.node_tree.links.new(emission.outputs[0], add.inputs[1])
-        shader = add.outputs[0]
+        shader = _sum(p, groups[0], shader, emission.outputs[0])
     if p.transparent:
         clear = _helper(p, groups[0], "ShaderNodeBsdfTransparent")
         shader = _mix(p, groups[0], "Alpha", clear.outputs[0], shader)
@@ -131,6 +133,44 @@ def _helper(p, group, kind):
     helper.location = (group.location.x + 220, group.location.y + 60 - 60 * count)
     helper.hide, helper[HELPS] = True, group.name
     return helper
+
+
+def _sum(p, group, first, second):
+    add = _helper(p, group, "ShaderNodeAddShader")
+    p.material.node_tree.links.new(first, add.inputs[0])
+    p.material.node_tree.links.new(second, add.inputs[1])
+    return add.outputs[0]
+
+
+def _rest(p, group):
+    """Nodes for the light that a layer leaves to its base, the polynomial of layer.rest()."""
+    tree = p.material.node_tree
+    # With this Blend, Facing is 1 minus the cosine.
+    view = _helper(p, group, "ShaderNodeLayerWeight")
+    view.inputs["Blend"].default_value = 0.5
+    if source := _source(p.node.inputs["Normal"]):
+        tree.links.new(source, view.inputs["Normal"])
+    roughness = None
+    if len(p.rest[0]) > 1:
+        clamped = _helper(p, group, "ShaderNodeClamp")
+        tree.links.new(_source(p.node.inputs["Roughness"]), clamped.inputs["Value"])
+        roughness = clamped.outputs[0]
+
+    def polynomial(coefficients, of):
+        """Horner's rule for numbers or outputs of nodes."""
+        found = coefficients[-1]
+        for c in reversed(coefficients[:-1]):
+            step = _helper(p, group, "ShaderNodeMath")
+            step.operation = "MULTIPLY_ADD"
+            for socket, operand in zip(step.inputs, (found, of, c), strict=True):
+                if isinstance(operand, float):
+                    socket.default_value = operand
+                else:
+                    tree.links.new(operand, socket)
+            found = step.outputs[0]
+        return found
+
+    return polynomial([polynomial(row, roughness) for row in p.rest], view.outputs["Facing"])
 
 
 def _mix(p, group, name, first, second):

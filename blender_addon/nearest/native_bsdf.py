@@ -7,6 +7,7 @@ bsdf_oren_nayar.h); tests/blender/test_convert.py compares them with its renders
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -54,6 +55,11 @@ def dielectric(f0, cosine):
     a = (g - c) / np.maximum(g + c, 1e-12)
     b = (c * (g + c) - 1) / np.maximum(c * (g - c) + 1, 1e-12)
     return 0.5 * a**2 * (1 + b**2)
+
+
+def mean_dielectric(f0):
+    """The cosine-weighted mean of dielectric() over the hemisphere."""
+    return float((dielectric(f0, _MU) * _SHARE).sum())
 
 
 def _clamp_to_one(color):
@@ -147,8 +153,9 @@ def _multiscatter(wo, native, average):
     """The factor (n, 3) of multiple scattering; `average`: mean reflectance of a microfacet."""
     if not native.multiscatter or native.beckmann:
         return np.ones((len(wo), 3))
+    average = np.broadcast_to(average, 3)
     seen = facet_albedo(wo, native.alpha, False)[:, None]
-    return multiple_scattering_factor(np.asarray(average), mean_facet_albedo(native.alpha), seen)
+    return multiple_scattering_factor(average, mean_facet_albedo(native.alpha), seen)
 
 
 def _oren_nayar_G(cosine):
@@ -177,21 +184,42 @@ def matte(wi, wo, color, roughness):
     return nl[..., None] * ((a + b * t)[..., None] + again * lost[..., None]) * color
 
 
+class ViewTerms(NamedTuple):
+    """The quantities of Glossy and Principled that depend on the view alone, for each view."""
+
+    #: Fraction of light that the dielectric interface keeps from the base, (k,).
+    taken: np.ndarray
+    #: Factors of multiple scattering between microfacets of the interface, (k,), and of metal, (k,
+    #: 3).
+    gloss: np.ndarray
+    metal: np.ndarray
+
+    def of(self, which):
+        """The same for directions, given the index of each one's view."""
+        return ViewTerms(*(each[which] for each in self))
+
+
 def view_terms(native, each):
-    """The quantities of Glossy and Principled that depend on the view alone, for each view (k, 3):
-    the fraction of light that the dielectric interface keeps from the base, (k,), and the factor of
-    multiple scattering between metal microfacets, (k, 3)."""
+    """The ViewTerms of views (k, 3)."""
+    none = ViewTerms(np.zeros(len(each)), np.ones(len(each)), np.ones((len(each), 3)))
     if native.is_mirror:
-        return dielectric(native.f0, each[:, 2]), np.ones((len(each), 3))
+        return none._replace(taken=dielectric(native.f0, each[:, 2]))
     color = np.asarray(native.color, np.float64)
     if native.kind == "glossy":
-        return np.zeros(len(each)), _multiscatter(each, native, color)
-    taken, scale = np.zeros(len(each)), np.ones((len(each), 3))
+        return none._replace(metal=_multiscatter(each, native, color))
+    terms = none
     if native.metallic < 1:
         taken = facet_albedo(each, native.alpha, False, lambda c: dielectric(native.f0, c))
+        if native.multiscatter:
+            gloss = _multiscatter(each, native, mean_dielectric(native.f0))[:, 0]
+            terms = terms._replace(taken=taken * gloss, gloss=gloss)
+        else:
+            # Cycles keeps from the base what facets would reflect if they hid no light.
+            whole = facet_albedo(each, native.alpha, False)
+            terms = terms._replace(taken=taken / whole)
     if native.metallic > 0:
-        scale = _multiscatter(each, native, mean_schlick(color))
-    return taken, scale
+        terms = terms._replace(metal=_multiscatter(each, native, mean_schlick(color)))
+    return terms
 
 
 def f_cos(native, wi, wo, views):
@@ -200,33 +228,37 @@ def f_cos(native, wi, wo, views):
     if native.kind == "diffuse":
         return matte(wi, wo, native.color, native.roughness)
     each, which = views
-    taken, scale = view_terms(native, each)
-    return f_cos_of_view(native, wi, wo, taken[which], scale[which])
+    return f_cos_of_view(native, wi, wo, view_terms(native, each).of(which))
 
 
-def f_cos_of_view(native, wi, wo, taken, scale):
-    """The same for Glossy and Principled, given view_terms() of each wo."""
+def f_cos_of_view(native, wi, wo, terms):
+    """The same for Glossy and Principled, given the ViewTerms of each wo."""
     lobe = np.zeros(len(wi)) if native.is_mirror else facets(wi, wo, native.alpha, native.beckmann)
     lobe = lobe[:, None]
     color = np.asarray(native.color, np.float64)
     if native.kind == "glossy":
-        return color * lobe * scale
+        return color * lobe * terms.metal
     cosine = (wo * half(wi, wo)).sum(-1)
-    base = matte(wi, wo, color, native.diffuse_roughness) * (1 - taken)[:, None]
-    plastic = base + lobe * dielectric(native.f0, cosine)[:, None]
-    metal = lobe * schlick(color, cosine) * scale
+    base = matte(wi, wo, color, native.diffuse_roughness) * (1 - terms.taken)[:, None]
+    plastic = base + lobe * (dielectric(native.f0, cosine) * terms.gloss)[:, None]
+    metal = lobe * schlick(color, cosine) * terms.metal
     return (1 - native.metallic) * plastic + native.metallic * metal
 
 
-def albedo(native, each, taken, scale):
+def albedo(native, each, terms):
     """Directional albedo (k, 3) of a Principled node with a smooth base, including ideal mirror
-    reflection, given view_terms() of each view (k, 3)."""
+    reflection, given the ViewTerms of views (k, 3)."""
     color = np.asarray(native.color, np.float64)
-    plastic, metal = taken[:, None] + color * (1 - taken)[:, None], 0.0
+    seen, metal = terms.taken, 0.0
     if native.is_mirror:
         metal = schlick(color, each[:, 2])
-    elif native.metallic > 0:
-        metal = facet_albedo(each, native.alpha, False, lambda c: schlick(color, c)) * scale
+    else:
+        if native.metallic < 1 and not native.multiscatter:
+            seen = seen * facet_albedo(each, native.alpha, False)
+        if native.metallic > 0:
+            metal = facet_albedo(each, native.alpha, False, lambda c: schlick(color, c))
+            metal = metal * terms.metal
+    plastic = seen[:, None] + color * (1 - terms.taken)[:, None]
     return (1 - native.metallic) * plastic + native.metallic * metal
 
 

@@ -62,6 +62,10 @@ UNDER_A_SUN = [
     ("principled", "GGX", {"Base_Color": GOLD, "Roughness": 0.5, "IOR": 1.6}),
     ("principled", "MULTI_GGX", {"Base_Color": GOLD, "Roughness": 0.6, "Metallic": 1.0}),
     ("principled", "GGX", {"Base_Color": GOLD, "Roughness": 0.5, "Metallic": 0.5}),
+    # The light that rough facets hide, or reflect more than once, is not the base's.
+    ("principled", "GGX", {"Base_Color": GOLD, "Roughness": 0.9}),
+    ("principled", "MULTI_GGX", {"Base_Color": GOLD, "Roughness": 0.9}),
+    ("principled", "MULTI_GGX", {"Base_Color": (0.0, 0.0, 0.0), "Roughness": 0.9, "IOR": 2.0}),
     # Colours above 1: all of some nodes, only the base of others.
     ("diffuse", None, {"Color": BRIGHT, "Roughness": 0.0}),
     ("diffuse", None, {"Color": BRIGHT, "Roughness": 0.7}),
@@ -91,15 +95,17 @@ def test_a_node_is_what_it_is_taken_for(extension, convert, empty, kind, distrib
     print(f"{kind} {distribution} {inputs}: relative L1 {error:.2g}")
     # Cycles takes these albedos from its own tables, which are coarse.
     tabled = kind == "principled" or distribution == "MULTI_GGX"
-    assert error < (0.03 if tabled else 2e-3)
+    assert error < (4e-3 if tabled else 1e-5)
 
 
 # ---- which model, and how near -------------------------------------------------------------------
 
 
-def test_the_setting_of_osl_counts_when_it_is_changed(extension, empty):
-    """Formula Nodes lack a choice of Ashikhmin and Shirley's model that plastic is nearest to."""
-    material, _ = material_of("principled", "GGX", Roughness=0.4)
+def test_the_setting_of_osl_counts_when_it_is_changed(extension, convert, empty, monkeypatch):
+    """Formula Nodes lack a choice of Ashikhmin and Shirley's model that plastic is nearest to, as
+    long as there is no layer over a base."""
+    monkeypatch.setattr(nearest_model(convert), "_layered", lambda native, has: ())
+    material, _ = material_of("principled", "GGX", Roughness=0.41)  # which no other test looks for
     chosen = []
     for osl in (False, True, False):
         empty.cycles.shading_system = osl
@@ -123,7 +129,8 @@ def test_what_is_a_model_already_is_off_by_nothing(extension, convert):
         ("diffuse", {"Roughness": 0.5}, {"oren_nayar"}, 0.08),
         ("glossy", {"Roughness": 0.3}, {"microfacet"}, 0.05),
         ("glossy", {"Roughness": 0.0, "Color": (0.5, 0.5, 0.5)}, {"lambertian_specular"}, 1e-6),
-        ("principled", {"Roughness": 0.4}, {"ashikhmin_shirley"}, 0.15),
+        ("principled", {"Roughness": 0.4}, {"microfacet"}, 0.01),
+        ("principled", {"Roughness": 0.4, "Diffuse_Roughness": 0.5}, {"microfacet"}, 0.07),
         ("principled", {"Roughness": 0.0}, {"coupled"}, 0.1),
         ("principled", {"Roughness": 0.4, "IOR": 1.0}, {"lambert"}, 1e-6),
         # Coloured mirrors.
@@ -132,7 +139,7 @@ def test_what_is_a_model_already_is_off_by_nothing(extension, convert):
         (
             "principled",
             {"Roughness": 0.0, "Metallic": 0.5, "Base_Color": GOLD},
-            {"ashikhmin_shirley"},
+            {"coupled"},
             0.05,
         ),
         (
@@ -152,15 +159,62 @@ def test_the_nearest_model(extension, convert, kind, inputs, models, worst):
     assert said in plan.line()
     # Any other width must be worse.
     (native,) = convert.natives(plan.node)
-    target = nearest_model(convert).Target(native)
-    assert target.error(plan.model, plan.values) == pytest.approx(plan.error, rel=1e-9)
-    least = target.misplaced(plan.model, plan.values)
+    if plan.metal:
+        return
+    target, base = nearest_model(convert).Target(native), None
+    if plan.base:
+        base = nearest_model(convert).Base(plan.base.model, plan.base.values, plan.rest)
+    assert target.error(plan.model, plan.values, base) == pytest.approx(plan.error, rel=1e-9)
+    least = target.misplaced(plan.model, plan.values, base)
     for candidate in nearest_model(convert).candidates(native):
         if candidate.model == plan.model and candidate.width:
             for factor in (0.7, 1.4):
                 other = dict(plan.values)
                 other[candidate.width.name] *= factor
-                assert target.misplaced(plan.model, other) >= least - 1e-6
+                assert target.misplaced(plan.model, other, base) >= least - 1e-6
+
+
+@pytest.mark.sample(3)
+@pytest.mark.parametrize("ior", [1.3, 1.5, 2.0])
+@pytest.mark.parametrize("roughness", [0.1, 0.2, 0.5, 1.0])
+def test_plastic_is_near_without_osl(convert, empty, roughness, ior):
+    """A layer of microfacets over a matte base, which has the light that the layer leaves. For a
+    black base only the two Fresnel terms differ."""
+    empty.cycles.shading_system = False
+    for color, worst in ((0.8, 0.015), (0.2, 0.035), (0.0, 0.1)):
+        inputs = {"Base_Color": (color,) * 3, "Roughness": roughness, "IOR": ior}
+        plan = only(convert.plan([material_of("principled", "GGX", **inputs)[0]]))
+        print(plan.line(), plan.values)
+        assert (plan.model, plan.base.model) == ("microfacet", "lambert")
+        assert plan.error < worst
+
+
+@pytest.mark.parametrize("osl", [False, True])
+@pytest.mark.parametrize("roughness", [0.3, "linked"])
+def test_a_picture_of_plastic_is_as_before(extension, convert, empty, roughness, osl):
+    """In a white world, with a bent normal, and back again."""
+    material, node = material_of("principled", "GGX", Base_Color=(0.5, 0.3, 0.1), Roughness=0.3)
+    bent = linked(material, node, "Normal", "ShaderNodeCombineXYZ")
+    for i, value in enumerate((0.3, -0.8, 0.5)):
+        bent.inputs[i].default_value = value
+    if roughness == "linked":
+        picture = picture_node(material.node_tree, (0.2, 0.2, 0.2), (0.9, 0.9, 0.9))
+        material.node_tree.links.new(picture.outputs["Color"], node.inputs["Roughness"])
+    before = flat(empty, material)
+    if osl:
+        extension.api.enable_osl(empty)
+    plan = only(convert.plan([material]))
+    print(plan.line())
+    assert plan.base and plan.base.links == {"rho": "Base Color"}
+    assert convert.apply([plan]) == 1
+    after = flat(empty, material)
+    print(f"{before} and {after}")
+    for x, y in zip(before, after, strict=True):
+        assert y == pytest.approx(x, rel=0.02)
+    count = len(material.node_tree.nodes)
+    assert convert.restore(material) == 1
+    assert len(material.node_tree.nodes) < count - 5
+    assert np.array(flat(empty, material)) == pytest.approx(np.array(before), rel=1e-3)
 
 
 def test_a_metal_of_single_scattering_is_the_microfacet_model(convert):
@@ -274,12 +328,13 @@ def test_links_stay(extension, convert):
     bump = linked(material, node, "Normal", "ShaderNodeBump")
     plans = convert.plan([material])
     assert convert.apply(plans) == 1
-    (group,) = extension.nodes.group_nodes(material)
-    sockets = extension.nodes.sockets(group)
-    assert sockets["rd"].links[0].from_node == colour
-    assert sockets["Normal"].links[0].from_node == bump
+    gloss, base = (extension.nodes.sockets(g) for g in extension.nodes.group_nodes(material))
+    assert base["rho"].links[0].from_node == colour
+    view = next(n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeLayerWeight")
+    for socket in (gloss["Normal"], base["Normal"], view.inputs["Normal"]):
+        assert socket.links[0].from_node == bump
     output = next(n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
-    assert output.inputs["Surface"].links[0].from_node == group
+    assert output.inputs["Surface"].links[0].from_node.bl_idname == "ShaderNodeAddShader"
     assert not node.outputs[0].is_linked
 
 
@@ -559,8 +614,8 @@ def test_a_link_that_blender_ignores_is_no_link(extension, convert, empty, ignor
     after = look(empty, material)
     print(f"{ignore.__name__}: {before} and {after}, said {plan.error}")
     assert after == pytest.approx(before, rel=0.06, abs=0.01)
-    (group,) = extension.nodes.group_nodes(material)
-    assert extension.nodes.constants(group)["rd"] is not None
+    _, base = extension.nodes.group_nodes(material)
+    assert extension.nodes.constants(base)["rho"] is not None
 
 
 def test_a_muted_node_is_not_converted(extension, convert, empty):
@@ -696,12 +751,12 @@ def of_a_library(material, node):
 
 
 IMPORTED = [
-    (of_old_versions, 1),
-    (of_fbx, 1),
-    (of_obj, 1),
-    (of_gltf, 2),
-    (without_metal, 1),
-    (of_a_library, 1),
+    (of_old_versions, 2),
+    (of_fbx, 2),
+    (of_obj, 2),
+    (of_gltf, 3),
+    (without_metal, 2),
+    (of_a_library, 2),
 ]
 
 
@@ -805,7 +860,7 @@ def test_back_where_the_node_of_a_mix_is_gone_is_a_twin_of_each(extension, conve
     assert convert.apply(convert.plan([material])) == 1
     material.node_tree.nodes.remove(node)
     groups = extension.nodes.group_nodes(material)
-    assert len(groups) == 2
+    assert len(groups) == 3
     before = [extension.nodes.identity(g) for g in groups]
     with pytest.raises(ValueError, match="Blender Nodes is only for"):
         convert.restore(material)
@@ -818,7 +873,7 @@ def test_back_where_the_node_of_a_mix_is_gone_is_a_twin_of_each(extension, conve
             )
     assert convert.restore(material) == 1
     groups = extension.nodes.group_nodes(material)
-    assert [extension.nodes.identity(g)[1] for g in groups] == ["twin", "twin"]
+    assert [extension.nodes.identity(g)[1] for g in groups] == ["twin"] * 3
     assert not any(convert.is_converted(g) for g in groups)
 
 
@@ -998,7 +1053,7 @@ def test_back_where_the_node_of_before_is_gone_is_the_twin(extension, convert):
 def test_the_button_has_a_limit(extension, item):
     start = shown_nodes()
     node = bpy.data.materials["principled"].node_tree.nodes["Principled BSDF"]
-    assert bpy.ops.brdfc.convert(limit=1.0) == {"FINISHED"}
+    assert bpy.ops.brdfc.convert(limit=0.5) == {"FINISHED"}
     shown = shown_nodes()
     assert shown["principled"] == start["principled"] and node.outputs[0].is_linked
     assert shown["diffuse"] != start["diffuse"]
@@ -1014,9 +1069,9 @@ def test_a_limit_that_is_changed_afterwards_plans_anew(extension, item):
     assert operator.execute(last, bpy.context) == {"FINISHED"}
     bpy.ops.ed.undo_push(message="Convert")
     assert bpy.ops.ed.undo() == {"FINISHED"}
-    last.limit = 1.0
+    last.limit = 0.5
     operator.draw(last, bpy.context)
-    assert last.layout.log == ["value : 1.0"]
+    assert last.layout.log == ["value : 0.5"]
     assert operator.execute(last, bpy.context) == {"FINISHED"}
     assert ["stays" in line for line in said] == [False, False, False, True]
 
