@@ -35,6 +35,8 @@ class Native:
     f0: float = 0.04
     #: Roughness of the diffuse base of a Principled node.
     diffuse_roughness: float = 0.0
+    #: Specular Tint of a Principled node: a factor of a metal's reflectance at 82 degrees.
+    tint: tuple = (1.0, 1.0, 1.0)
 
     @property
     def alpha(self):
@@ -75,6 +77,23 @@ def schlick(color, cosine):
 def mean_schlick(color):
     """The cosine-weighted mean of schlick() over the hemisphere."""
     return (20 * _clamp_to_one(color) + 1) / 21
+
+
+def _edge_loss(native):
+    """The factor of cos (1 - cos)^6 that a metal's Specular Tint takes from schlick()."""
+    strongest = 1 / 7 * (6 / 7) ** 6
+    return (1 - _clamp_to_one(native.tint)) * schlick(native.color, np.array(1 / 7)) / strongest
+
+
+def metal_fresnel(native, cosine):
+    """Reflectance of a metal: Schlick's with an edge tint, after Kutz et al. 2021."""
+    c = np.clip(cosine, 0, 1)[..., None]
+    return np.clip(schlick(native.color, cosine) - _edge_loss(native) * c * (1 - c) ** 6, 0, 1)
+
+
+def mean_metal_fresnel(native):
+    """The cosine-weighted mean of metal_fresnel(), as Cycles computes it."""
+    return np.clip(mean_schlick(native.color) - _edge_loss(native) / 126, 0, 1)
 
 
 def _shadow(w, alpha, beckmann):
@@ -218,7 +237,7 @@ def view_terms(native, each):
             whole = facet_albedo(each, native.alpha, False)
             terms = terms._replace(taken=taken / whole)
     if native.metallic > 0:
-        terms = terms._replace(metal=_multiscatter(each, native, mean_schlick(color)))
+        terms = terms._replace(metal=_multiscatter(each, native, mean_metal_fresnel(native)))
     return terms
 
 
@@ -241,7 +260,7 @@ def f_cos_of_view(native, wi, wo, terms):
     cosine = (wo * half(wi, wo)).sum(-1)
     base = matte(wi, wo, color, native.diffuse_roughness) * (1 - terms.taken)[:, None]
     plastic = base + lobe * (dielectric(native.f0, cosine) * terms.gloss)[:, None]
-    metal = lobe * schlick(color, cosine) * terms.metal
+    metal = lobe * metal_fresnel(native, cosine) * terms.metal
     return (1 - native.metallic) * plastic + native.metallic * metal
 
 
@@ -251,12 +270,12 @@ def albedo(native, each, terms):
     color = np.asarray(native.color, np.float64)
     seen, metal = terms.taken, 0.0
     if native.is_mirror:
-        metal = schlick(color, each[:, 2])
+        metal = metal_fresnel(native, each[:, 2])
     else:
         if native.metallic < 1 and not native.multiscatter:
             seen = seen * facet_albedo(each, native.alpha, False)
         if native.metallic > 0:
-            metal = facet_albedo(each, native.alpha, False, lambda c: schlick(color, c))
+            metal = facet_albedo(each, native.alpha, False, lambda c: metal_fresnel(native, c))
             metal = metal * terms.metal
     plastic = seen[:, None] + color * (1 - terms.taken)[:, None]
     return (1 - native.metallic) * plastic + native.metallic * metal
@@ -269,4 +288,4 @@ def mirror(native, wo):
     if native.kind == "glossy":
         return np.broadcast_to(np.asarray(native.color, np.float64), (len(wo), 3))
     plastic = dielectric(native.f0, wo[:, 2])[:, None]
-    return (1 - native.metallic) * plastic + native.metallic * schlick(native.color, wo[:, 2])
+    return (1 - native.metallic) * plastic + native.metallic * metal_fresnel(native, wo[:, 2])

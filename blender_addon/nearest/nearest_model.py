@@ -121,7 +121,7 @@ _COLORED = (
     ),
     Candidate(
         "microfacet",
-        lambda n: {"f0": n.color, "tint": (1.0, 1.0, 1.0)},
+        lambda n: {"f0": n.color, "tint": n.tint},
         _FACETS,
         {"f0": "Color"},
     ),
@@ -156,6 +156,12 @@ _MIRRORS = (
     Candidate("max_phong", lambda n: {"ks": n.color, "e": _SHARP}, links={"ks": "Color"}),
 )
 _METAL_MIRROR = Candidate("schlick", lambda n: {"r": n.color, "rough": 0.0}, links={"r": "Color"})
+#: Facets as steep as the narrowest lobe by which directions are sampled.
+_TINTED_MIRROR = Candidate(
+    "microfacet",
+    lambda n: {"f0": n.color, "tint": n.tint, "ax": _NARROWEST, "ay": _NARROWEST},
+    links={"f0": "Color"},
+)
 _COATED = Candidate("coupled", lambda n: {"r0": n.f0, "rm": n.color}, None, {"rm": "Color"})
 
 
@@ -203,6 +209,8 @@ def _candidates(native, has):
     if native.is_mirror and native.metallic == 0:
         return (_COATED,)
     if native.is_mirror:
+        if native.tint != (1, 1, 1):
+            return (_METAL_MIRROR, _TINTED_MIRROR)
         return (_METAL_MIRROR,) if native.metallic == 1 else _polished({}, sharp=True)
     if native.kind == "glossy":
         return _COLORED

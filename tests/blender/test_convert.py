@@ -66,6 +66,21 @@ UNDER_A_SUN = [
     ("principled", "GGX", {"Base_Color": GOLD, "Roughness": 0.9}),
     ("principled", "MULTI_GGX", {"Base_Color": GOLD, "Roughness": 0.9}),
     ("principled", "MULTI_GGX", {"Base_Color": (0.0, 0.0, 0.0), "Roughness": 0.9, "IOR": 2.0}),
+    # An edge tint, which makes the reflectance of dark metal 0 at grazing views.
+    *(
+        (
+            "principled",
+            kind,
+            {
+                "Base_Color": color,
+                "Metallic": 1.0,
+                "Specular_Tint": (0.0, 0.5, 1.0),
+                "Roughness": 0.3,
+            },
+        )
+        for kind in ("GGX", "MULTI_GGX")
+        for color in (GOLD, (0.05, 0.05, 0.05))
+    ),
     # Colours above 1: all of some nodes, only the base of others.
     ("diffuse", None, {"Color": BRIGHT, "Roughness": 0.0}),
     ("diffuse", None, {"Color": BRIGHT, "Roughness": 0.7}),
@@ -229,6 +244,29 @@ def test_a_metal_of_single_scattering_is_the_microfacet_model(convert):
         if distribution == "GGX":
             assert plan.values["ax"] == plan.values["ay"] == pytest.approx(0.25)
             assert plan.values["f0"] == pytest.approx(GOLD)
+
+
+TINTED = [
+    (GOLD, 0.3, 0.02),
+    (GOLD, 0.0, 0.025),
+    ((0.95, 0.9, 0.8), 0.5, 0.003),
+    ((0.1, 0.1, 0.1), 0.3, 0.1),
+]
+
+
+@pytest.mark.parametrize(("color", "roughness", "worst"), TINTED)
+def test_a_tinted_metal_is_the_microfacet_model(convert, color, roughness, worst):
+    """Whose tint is a factor, not a term that is subtracted. The darker the metal, the more the two
+    differ."""
+    tint = (1.0, 0.7, 0.4)
+    given = {"Base_Color": color, "Metallic": 1.0, "Roughness": roughness, "Specular_Tint": tint}
+    material, node = material_of("principled", "GGX", **given)
+    plan = only(convert.plan([material]))
+    print(plan.line(), plan.values)
+    assert plan.model == "microfacet" and plan.values["tint"] == pytest.approx(tint)
+    assert plan.error < worst
+    node.inputs["Metallic"].default_value = 0.5
+    assert "has a Specular Tint" in only(convert.plan([material])).refusal
 
 
 def test_the_error_is_that_of_the_bright_colour(convert):
