@@ -76,6 +76,9 @@ def _replace(p, parts):
     for i, other in enumerate(others):
         other[HELPS] = group.name
         other.location.y -= 300 * (i + 1)
+        for helper in p.material.node_tree.nodes:
+            if helper.get(HELPS) == other.name:
+                helper[HELPS] = group.name
     shader = _joined(p, groups)
     for link in [link for link in node.outputs[0].links if shader_trees.counts(link)]:
         target = link.to_socket
@@ -99,6 +102,8 @@ def _add(p, prepared):
     for name in (pack.NORMAL, pack.TANGENT):
         if name in node.inputs and (source := _source(node.inputs[name])):
             tree.links.new(source, present[name])
+    if prepared.part.again:
+        tree.links.new(_again(p, group, prepared.part.again), present["again"])
     for name, *law in prepared.part.widths:
         tree.links.new(_follow(tree, group, _source(node.inputs["Roughness"]), *law), present[name])
     return group
@@ -150,27 +155,54 @@ def _rest(p, group):
     view.inputs["Blend"].default_value = 0.5
     if source := _source(p.node.inputs["Normal"]):
         tree.links.new(source, view.inputs["Normal"])
-    roughness = None
-    if len(p.rest[0]) > 1:
-        clamped = _helper(p, group, "ShaderNodeClamp")
-        tree.links.new(_source(p.node.inputs["Roughness"]), clamped.inputs["Value"])
-        roughness = clamped.outputs[0]
+    roughness = _roughness(p, group) if len(p.rest[0]) > 1 else None
+    rows = [_polynomial(p, group, row, roughness) for row in p.rest]
+    return _polynomial(p, group, rows, view.outputs["Facing"])
 
-    def polynomial(coefficients, of):
-        """Horner's rule for numbers or outputs of nodes."""
-        found = coefficients[-1]
-        for c in reversed(coefficients[:-1]):
-            step = _helper(p, group, "ShaderNodeMath")
-            step.operation = "MULTIPLY_ADD"
-            for socket, operand in zip(step.inputs, (found, of, c), strict=True):
-                if isinstance(operand, float):
-                    socket.default_value = operand
-                else:
-                    tree.links.new(operand, socket)
-            found = step.outputs[0]
-        return found
 
-    return polynomial([polynomial(row, roughness) for row in p.rest], view.outputs["Facing"])
+def _roughness(p, group):
+    """The linked roughness between 0 and 1."""
+    clamped = _helper(p, group, "ShaderNodeClamp")
+    p.material.node_tree.links.new(_source(p.node.inputs["Roughness"]), clamped.inputs["Value"])
+    return clamped.outputs[0]
+
+
+def _polynomial(p, group, coefficients, of):
+    """Nodes for Horner's rule. Coefficients are numbers or outputs of nodes."""
+    found = coefficients[-1]
+    for c in reversed(coefficients[:-1]):
+        found = _operation(p, group, "ShaderNodeMath", "MULTIPLY_ADD", found, of, c)
+    return found
+
+
+def _operation(p, group, kind, operation, *operands):
+    """A Math or Vector Math node. Operands are numbers, vectors or outputs of nodes."""
+    step = _helper(p, group, kind)
+    step.operation = operation
+    for socket, operand in zip(step.inputs, operands, strict=False):
+        if isinstance(operand, bpy.types.NodeSocket):
+            p.material.node_tree.links.new(operand, socket)
+        elif isinstance(operand, float) and kind == "ShaderNodeVectorMath":
+            socket.default_value = (operand,) * 3
+        else:
+            socket.default_value = operand
+    return step.outputs[0]
+
+
+def _again(p, group, law):
+    """Nodes for native_bsdf.interreflection() of a linked colour or roughness."""
+    slope, offset, mean, color = law
+
+    def vector(operation, *operands):
+        return _operation(p, group, "ShaderNodeVectorMath", operation, *operands)
+
+    source = _source(p.node.inputs[color]) or shader_values.constant(p.node.inputs[color])
+    average = vector("MULTIPLY_ADD", source, slope, offset)
+    roughness = _roughness(p, group) if len(mean) > 1 else None
+    mean = _polynomial(p, group, mean, roughness)
+    lost = _operation(p, group, "ShaderNodeMath", "SUBTRACT", mean, 1.0)
+    left = vector("MULTIPLY_ADD", average, lost, 1.0)
+    return vector("DIVIDE", vector("MULTIPLY", average, mean), left)
 
 
 def _mix(p, group, name, first, second):

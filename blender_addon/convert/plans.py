@@ -9,6 +9,7 @@ from .. import lamps
 from ..common import editable
 from ..common.i18n import Sentence, say
 from ..groups import nodes
+from ..nearest import layer, native_bsdf
 from ..nearest.native_bsdf import Native
 from ..nearest.nearest_model import base_of, nearest, with_width
 from ..packs import device, pack
@@ -43,6 +44,10 @@ class Part:
     #: The matte base beneath the model, and the light that it gets: coefficients of layer.rest().
     base: "Part | None" = None
     rest: tuple = ()
+    #: How the interreflection of `microfacet` follows a linked colour or roughness: the slope and
+    #: offset of the mean reflectance in the colour, the mean albedo of facets that reflect
+    #: everything, as coefficients of roughness^j, and the socket of the colour.
+    again: tuple = ()
 
     @property
     def label(self):
@@ -164,7 +169,15 @@ def _part(inputs, native, fit):
     if below:
         linked = {name: color for name in candidate.base.candidate.links}
         base = Part(below.model, below.values, linked)
-    return Part(candidate.model, values, links, widths, base, below.rest if below else ())
+    again = ()
+    if "again" in values and (inputs.reaches("Roughness") or inputs.reaches(color)):
+        slope, offset = (tuple(law.tolist()) for law in native_bsdf.facet_law(native))
+        mean = layer.mean_albedo()
+        if not inputs.reaches("Roughness"):
+            mean = (float(native_bsdf.mean_facet_albedo(native.alpha)),)
+        again = slope, offset, mean, color
+    rest = below.rest if below else ()
+    return Part(candidate.model, values, links, widths, base, rest, again)
 
 
 def _plan_node(material, node):

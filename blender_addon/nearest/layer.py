@@ -40,6 +40,15 @@ def rest(f0, multiscatter, roughness=None):
     return tuple(tuple(float(c) for c in row) for row in rows)
 
 
+@functools.cache
+def mean_albedo():
+    """The cosine-weighted mean albedo of GGX microfacets that reflect everything: coefficients of
+    roughness^j, which are 0.002 off at most."""
+    r = np.linspace(0.02, 1, 30)
+    found = np.polyfit(r, [native_bsdf.mean_facet_albedo((x * x, x * x)) for x in r], 5)
+    return tuple(float(c) for c in found[::-1])
+
+
 def rest_at(coefficients, cosine, roughness):
     """The polynomial of rest() at view cosines, from 0 to 1, as the nodes of a plan compute it."""
     x, sum_ = 1 - np.clip(cosine, 0, 1), 0.0

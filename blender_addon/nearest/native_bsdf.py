@@ -6,7 +6,7 @@ wo to the viewer. The formulas are those of Cycles 4.5 to 5.2 (kernel/closure/bs
 bsdf_oren_nayar.h); tests/blender/test_convert.py compares them with its renders.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -161,11 +161,36 @@ def mean_facet_albedo(alpha):
     return (facet_albedo(views, alpha, False) * _SHARE).sum()
 
 
+def interreflection(average, mean):
+    """The share of the light that microfacets would reflect again which they do reflect. `average`:
+    mean reflectance of a microfacet. `mean`: albedo of microfacets that reflect everything,
+    averaged over views."""
+    return average * mean / (1 - average * (1 - mean))
+
+
 def multiple_scattering_factor(average, mean, seen):
-    """The factor by which multiple scattering between microfacets raises the albedo. `average`:
-    mean reflectance of a microfacet. `mean` and `seen`: albedo of microfacets that reflect
-    everything, averaged over views and from the viewer."""
-    return 1 + average * mean / (1 - average * (1 - mean)) * (1 - seen) / seen
+    """The factor by which multiple scattering between microfacets raises the albedo. `seen`: as
+    `mean`, from the viewer."""
+    return 1 + interreflection(average, mean) * (1 - seen) / seen
+
+
+def facet_law(native):
+    """The slope and offset, (3,) each, of the mean reflectance of a node's microfacets in its
+    colour: those of the metal, if it is one."""
+    if native.kind == "glossy":
+        return np.ones(3), np.zeros(3)
+    if native.metallic == 0:
+        return np.zeros(3), np.full(3, mean_dielectric(native.f0))
+    black, white = (mean_metal_fresnel(replace(native, color=c)) for c in ((0.0,) * 3, (1.0,) * 3))
+    return white - black, black
+
+
+def again(native):
+    """The interreflection() of a node with Multiscatter GGX, as a colour."""
+    slope, offset = facet_law(native)
+    average = slope * _clamp_to_one(native.color) + offset
+    found = interreflection(average, mean_facet_albedo(native.alpha))
+    return tuple(float(c) for c in np.clip(found, 0, 1))
 
 
 def _multiscatter(wo, native, average):

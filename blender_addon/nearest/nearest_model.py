@@ -109,6 +109,15 @@ def _base(native):
     return tuple(min(share * c / max(1 - m, 1e-6), 1.0) for c, m in mixed)
 
 
+def _distribution(native):
+    """The distribution of `microfacet` that is the node's own."""
+    if native.beckmann:
+        return {"distribution": "beckmann"}
+    if not native.multiscatter:
+        return {}
+    return {"distribution": "multiscatter_ggx", "again": native_bsdf.again(native)}
+
+
 _SLOPE = {"low": 1e-3, "high": 1.0, "power": 2}
 _EXPONENT = {"low": 1.0, "high": 1e6, "power": -4, "usual": 2.0}
 _FACETS = Width("ax", 1e-4, 1.0, 2, across="ay", stretched=0.5)
@@ -121,7 +130,7 @@ _COLORED = (
     ),
     Candidate(
         "microfacet",
-        lambda n: {"f0": n.color, "tint": n.tint},
+        lambda n: {"f0": n.color, "tint": n.tint, **_distribution(n)},
         _FACETS,
         {"f0": "Color"},
     ),
@@ -192,7 +201,7 @@ def _layered(native, has):
         return ()
     f0, tint = layer.schlick_like(native.f0)
     values = {"f0": (f0,) * 3, "tint": (tint,) * 3}
-    return (Candidate("microfacet", lambda n: values, _FACETS, base=base),)
+    return (Candidate("microfacet", lambda n: values | _distribution(n), _FACETS, base=base),)
 
 
 def candidates(native, has=lambda model, values: True):
