@@ -712,6 +712,7 @@ def test_only_choices_leave_parameters_unread(extension):
     proportion = {"proportion": ["custom"]}
     assert needs == {
         ("ashikhmin_shirley", "rd"): {"part": ["both", "diffuse"]},
+        ("microfacet", "again"): {"distribution": ["multiscatter_ggx"]},
         **drawn,
         ("radziszewski_alda", "n"): {"proportion": ["paper", "equal"]},
         ("radziszewski_alda", "n_theta"): proportion | {"part": ["product", "latitudinal"]},
