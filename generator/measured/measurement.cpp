@@ -12,7 +12,9 @@
 
 namespace brdfc::measured {
 
-Measurement read_measurement(const std::filesystem::path& path, const ToRgb& to_rgb) {
+namespace {
+
+Measurement read(const std::filesystem::path& path, const ToRgb& to_rgb) {
   std::string extension = path.extension().string();
   std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
   if (extension == ".binary") return read_merl(path);
@@ -21,6 +23,22 @@ Measurement read_measurement(const std::filesystem::path& path, const ToRgb& to_
   if (extension == ".csv") return read_csv_grid(path);
   input_error("{}: expected a name that ends with one of {}: MERL, RGL, UTIA or a table", path.string(),
               fmt::join(kExtensions, ", "));
+}
+
+}  // namespace
+
+Measurement read_measurement(const std::filesystem::path& path, const ToRgb& to_rgb) {
+  Measurement m = read(path, to_rgb);
+  if (!(m.largest > 0)) input_error("{}: expected a number above 0, found none: the data are black", m.file);
+  return m;
+}
+
+double largest(const std::vector<std::array<float, 3>>& values) {
+  double out = 0;
+  for (const auto& value : values)
+    for (const float v : value)
+      if (v > out) out = v;
+  return out;
 }
 
 std::string counted(std::size_t count, const std::string& one, const std::string& many) {

@@ -35,6 +35,7 @@ struct Measurement {
   std::string grid;                ///< resolution, for people
   bool isotropic = true;           ///< unchanged when both directions are rotated about the normal
   double highest = 90;             ///< largest angle to the normal that was measured, in degrees
+  double largest = 0;              ///< of the numbers that it was made of
   std::vector<std::string> notes;  ///< a sentence for each thing that was assumed, left out or repaired
   std::shared_ptr<const Table> table;
 };
@@ -47,5 +48,8 @@ inline constexpr std::array<const char*, 4> kExtensions{".binary", ".bsdf", ".bi
 
 /// "1 entry is" or "12 entries are"
 std::string counted(std::size_t count, const std::string& one, const std::string& many);
+
+/// The largest number of all channels, without NaN.
+double largest(const std::vector<std::array<float, 3>>& values);
 
 }  // namespace brdfc::measured

@@ -72,9 +72,12 @@ Warp read_warp(TensorFile& file, const std::string& field, std::size_t slices, b
               fmt::format("{} slices, one for each phi_i and theta_i, got {}", slices, data.size() / (width * height)));
   if (const auto bad = std::find_if(data.begin(), data.end(), [](float v) { return v < 0; }); bad != data.end())
     file.fail(field, fmt::format("no number below 0, got {}", *bad));
-  if (cumulative)
+  if (cumulative) {
     if (const std::size_t empty = Warp::empty_slice(data, width, height); empty < slices)
       file.fail(field, fmt::format("a number above 0 in each slice, found none in slice {}", empty));
+  } else if (std::ranges::none_of(data, [](float v) { return v > 0; })) {
+    file.fail(field, "a number above 0, found none");
+  }
   return Warp(std::move(data), width, height, cumulative);
 }
 
@@ -179,6 +182,7 @@ Measurement read_rgl(const std::filesystem::path& path, const ToRgb& to_rgb) {
         for (std::size_t c = 0; c < 3; ++c) {
           negative += value[c] < 0;
           planes[c][s * size + i] = float(value[c]);
+          out.largest = std::max(out.largest, value[c]);
         }
       }
     if (negative)
@@ -191,6 +195,19 @@ Measurement read_rgl(const std::filesystem::path& path, const ToRgb& to_rgb) {
   if (!table->isotropic)
     table->reduction =
         int(std::lround(std::min(2 * kPi / (double(table->phis.back()) - double(table->phis.front())), 100.)));
+  if (!table->isotropic) {
+    const auto in_degrees = [](double radians) { return radians * 180 / kPi; };
+    const double to = table->reduction == 4   ? -kPi / 2
+                      : table->reduction >= 2 ? 0
+                                              : kPi,
+                 first = double(table->phis.front()), last = double(table->phis.back()),
+                 step = (last - first) / double(table->phis.size() - 1);
+    if (first > -kPi + 1.01 * step || last < to - 1.01 * step)
+      out.notes.push_back(
+          fmt::format("phi_i: measured from {:.4g} to {:.4g} degrees, and azimuths from -180 to {:.4g} are needed: the "
+                      "values at these ends hold beyond",
+                      in_degrees(first), in_degrees(last), in_degrees(to)));
+  }
   static const std::set<std::string> known{"phi_i",    "theta_i",     "ndf",     "sigma", "vndf",       "luminance",
                                            "jacobian", "description", "spectra", "rgb",   "wavelengths"};
   for (const auto& [name, f] : file.fields())

@@ -258,6 +258,9 @@ def test_what_a_table_leaves_out_is_said(tmp_path):
     (said,) = notes(
         theta, circle, theta, circle, change=lambda ti, pi, to, po: (ti == 0) & (pi == 90)
     )
+    # Rows that say the same twice are one.
+    file.write_text(file.read_text() + file.read_text().partition("\n")[2])
+    assert told(file)["notes"] == [said]
     assert said.startswith("rows of one direction along the normal differ by up to 48 %")
 
 
@@ -283,10 +286,12 @@ def test_headers_are_read_as_programs_write_them(tmp_path):
     assert done.returncode == 2 and "line 1: expected one column r, found several" in done.stderr
 
 
-def test_every_model_is_fitted_to_black_data(tmp_path):
+def test_every_model_is_fitted_to_data_that_are_almost_black(tmp_path):
+    """Light of a single pair of directions at the horizon, which samples do not find."""
     file = tmp_path / "black.csv"
-    axes = grid(range(0, 91, 15), [0], range(0, 91, 15), range(0, 181, 15))
-    file.write_text(angle_table(*axes, *(0 * axes[0],) * 3), encoding="utf-8")
+    axes = grid([*range(0, 90, 15), 89.9999, 90], [0], [*range(0, 90, 15), 89.9999, 90], [0, 180])
+    f = np.where((axes[0] == 90) & (axes[2] == 90), 0.1, 0)
+    file.write_text(angle_table(*axes, f, f, f), encoding="utf-8")
     done = run("measured", file, "--json", "--models", "lambert,factors,microfacet")
     assert done.returncode == 0, done.stderr
     fits = {fit["model"]: fit for fit in json.loads(done.stdout)["fits"]}
@@ -344,6 +349,8 @@ def with_nan(array):
 
 RGL = rgl_fields("isotropic")
 FLAT = np.zeros((90 * 90 * 180, 3))
+#: Nothing that was measured is reflected.
+DARK = np.where(np.arange(len(FLAT))[:, None] % 2, -1.0, 0.0) + FLAT
 #: File name, content, and what is said of it.
 BAD = {
     "empty.binary": (b"", "header: expected 3 numbers"),
@@ -381,12 +388,27 @@ BAD = {
         "line 2: theta_i: expected",
     ),
     "twice.csv": (
-        b"theta_i,phi_i,theta_o,phi_o,r,g,b\n10,0,10,0,1,1,1\n10,0,10,0,1,1,1\n",
-        "line 3: expected each combination of angles once",
+        b"theta_i,phi_i,theta_o,phi_o,r,g,b\n10,0,10,0,1,1,1\n\n10,0,10,0,1,1,2\n",
+        "line 4: expected each combination of angles once, or the same values: "
+        "theta_i 10, phi_i 0, theta_o 10, phi_o 0 is in line 2, too\n",
+    ),
+    "pole.csv": (
+        b"theta_i,phi_i,theta_o,phi_o,r,g,b\n0,0,10,0,1,1,1\n0,0,10,0,1,1,2\n",
+        "line 3: expected each combination of angles once, or the same values: "
+        "theta_i 0, phi_i 0, theta_o 10, phi_o 0 is in line 2, too\n",
     ),
     "turn.csv": (
         b"theta_i,phi_i,theta_o,phi_o,r,g,b\n10,0,10,0,1,1,1\n10,360,10,0,1,1,2\n",
-        "phi_o 0 stands twice, with other values: azimuths a full turn apart are the same",
+        "phi_o 0 is in line 2, too: azimuths a full turn apart are the same",
+    ),
+    "black.binary": (merl(FLAT), "expected a number above 0, found none: the data are black"),
+    "dark.binary": (merl(DARK), "expected a number above 0, found none: the data are black"),
+    "black.bin": (utia(np.zeros((288 * 288, 3))), "expected a number above 0, found none"),
+    "black.bsdf": (changed(rgb=0 * RGL["rgb"]), "expected a number above 0, found none: the data"),
+    "ndf.bsdf": (changed(ndf=0 * RGL["ndf"]), "ndf: expected a number above 0, found none"),
+    "black.csv": (
+        b"theta_i,phi_i,theta_o,phi_o,r,g,b\n10,0,10,0,0,0,0\n10,0,10,90,0,-1,0\n",
+        "black.csv: expected a number above 0, found none: the data are black",
     ),
     "semicolons.csv": (
         b"theta_i;phi_i;theta_o;phi_o;r;g;b\n10;0;10;0;1;1;1\n",
@@ -419,6 +441,19 @@ def test_fields_that_are_not_known_are_named(tmp_path):
     file = tmp_path / "m.bsdf"
     file.write_bytes(changed(valid=np.ones(3, np.float32)))
     assert told(file)["notes"] == ["valid: this field is not known and was not read"]
+
+
+def test_azimuths_that_a_tensor_file_lacks_are_said(tmp_path):
+    """The tables are those of negative azimuths. Others used to be looked up at the ends."""
+    fields = rgl_fields("anisotropic")
+    file = tmp_path / "m.bsdf"
+    file.write_bytes(tensor(fields))
+    assert told(file)["notes"] == []
+    file.write_bytes(tensor(fields | {"phi_i": fields["phi_i"] + np.float32(np.pi)}))
+    assert told(file)["notes"] == [
+        "phi_i: measured from 0 to 180 degrees, and azimuths from -180 to 0 are needed: the values "
+        "at these ends hold beyond"
+    ]
 
 
 @pytest.mark.parametrize("name", ["none.binary", "none.bsdf", "none.bin", "none.csv"])
