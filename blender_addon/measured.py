@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measured BRDFs: the models that come close to a file of MERL, RGL or UTIA, or to a table.
+"""Measured BRDFs: the models that come close to a file of MERL, RGL, UTIA or ALTA, or to a table.
 
 The program brdfc reads the file and fits the models.
 """
@@ -21,8 +21,8 @@ LOBES, MOST_LOBES = 4, 12
 #: What stands for the sum of lobes where a model is asked for.
 SUM = "lobes"
 
-#: Endings of the files that the program reads: MERL, RGL, UTIA, and tables.
-ENDINGS = (".binary", ".bsdf", ".bin", ".csv")
+#: Endings of the files that the program reads: MERL, RGL, UTIA, ALTA, and tables.
+ENDINGS = (".binary", ".bsdf", ".bin", ".alta", ".dat", ".csv")
 
 
 class MeasuredError(RuntimeError):

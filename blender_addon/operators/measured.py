@@ -35,7 +35,8 @@ class BRDFC_OT_new_measured_material(ModalJob, Operator):
     bl_label = "New Measured Material..."
     bl_description = (
         "Make a material that comes close to a measured BRDF: a file of MERL (.binary), RGL "
-        "(.bsdf) or UTIA (.bin), or a table (.csv). The program brdfc fits every model to it"
+        "(.bsdf), UTIA (.bin) or ALTA (.alta, .dat), or a table (.csv). The program brdfc fits "
+        "every model to it"
     )
     bl_options = {"REGISTER", "UNDO"}
 

@@ -116,7 +116,8 @@ void add_measured_command(CLI::App& app) {
       "What a file with a measured BRDF holds, what it lacks, how much light it reflects, and every model fitted to "
       "it,\n"
       "the best first: the share of the light that the model sends in other directions, and its parameters.\n"
-      "FILE is one of the MERL database (.binary), of RGL (.bsdf), of UTIA (.bin), or a table (.csv) with the columns\n"
+      "FILE is one of the MERL database (.binary), of RGL (.bsdf), of UTIA (.bin), of ALTA as text (.alta, .dat),\n"
+      "or a table (.csv) with the columns\n"
       "theta_i,phi_i,theta_o,phi_o in degrees (theta_i_rad,... in radians), or wi_x,wi_y,wi_z,wo_x,wo_y,wo_z, and "
       "r,g,b in 1/sr, a row for every\n"
       "combination of angles. Colours are linear Rec.709.");

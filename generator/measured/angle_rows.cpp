@@ -33,6 +33,11 @@ std::vector<double> axis_of(const std::set<long>& values) {
   return out;
 }
 
+/// Whether all are the same numbers, or all NaN.
+bool same(const std::array<float, 3>& a, const std::array<float, 3>& b) {
+  return a == b || (std::isnan(a[0]) && std::isnan(b[0]));
+}
+
 }  // namespace
 
 long steps(double degrees) { return std::lround(degrees / kStep); }
@@ -96,9 +101,9 @@ void AngleRows::remove_rounding() {
       if (k % 2 == 1 && row.angles[k] > steps(360) - kRounding) row.angles[k] = 0;
       if (matters(row.angles, k)) values.insert(row.angles[k]);
     }
-    const auto same = without_rounding(values);
+    const auto rounded = without_rounding(values);
     for (AngleRow& row : given_)
-      if (matters(row.angles, k)) row.angles[k] = same.at(row.angles[k]);
+      if (matters(row.angles, k)) row.angles[k] = rounded.at(row.angles[k]);
   }
 }
 
@@ -111,7 +116,7 @@ void AngleRows::collect() {
     const bool several = row.vector && without_poles(a) == a &&
                          std::ranges::any_of(poles_, [&](std::size_t pole) { return a[pole] == 0; });
     if (!is_new && !several) {
-      if (at->second->value == row.value) continue;
+      if (same(at->second->value, row.value)) continue;
       input_error("{} line {}: expected each combination of angles once, or the same values: {} is in line {}, too{}",
                   file_, row.line, say(a), at->second->line,
                   row.wrapped || at->second->wrapped ? ": azimuths a full turn apart are the same" : "");

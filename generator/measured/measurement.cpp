@@ -5,6 +5,7 @@
 #include <cctype>
 
 #include "core/error.h"
+#include "measured/alta.h"
 #include "measured/csv_grid.h"
 #include "measured/merl.h"
 #include "measured/rgl.h"
@@ -20,8 +21,9 @@ Measurement read(const std::filesystem::path& path, const ToRgb& to_rgb) {
   if (extension == ".binary") return read_merl(path);
   if (extension == ".bsdf") return read_rgl(path, to_rgb);
   if (extension == ".bin") return read_utia(path);
+  if (extension == ".alta" || extension == ".dat") return read_alta(path);
   if (extension == ".csv") return read_csv_grid(path);
-  input_error("{}: expected a name that ends with one of {}: MERL, RGL, UTIA or a table", path.string(),
+  input_error("{}: expected a name that ends with one of {}: MERL, RGL, UTIA, ALTA or a table", path.string(),
               fmt::join(kExtensions, ", "));
 }
 

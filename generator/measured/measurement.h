@@ -6,6 +6,7 @@
 //   RGL .bsdf       J. Dupuy, W. Jakob: An Adaptive Parameterization for Efficient Material Acquisition and Rendering,
 //                   SIGGRAPH Asia 2018
 //   UTIA .bin       J. Filip, R. Vavra: Template-Based Sampling of Anisotropic BRDFs, Pacific Graphics 2014
+//   ALTA .alta .dat text of the BRDF library ALTA (measured/alta.h)
 //   CSV             a value for every combination of angles (measured/csv_grid.h)
 #pragma once
 
@@ -30,7 +31,7 @@ class Table {
 
 struct Measurement {
   std::string file;
-  std::string format;              ///< "MERL", "RGL", "UTIA" or "CSV"
+  std::string format;              ///< "MERL", "RGL", "UTIA", "ALTA" or "CSV"
   std::string description;         ///< text that the file has about itself, if any
   std::string grid;                ///< resolution, for people
   bool isotropic = true;           ///< unchanged when both directions are rotated about the normal
@@ -44,7 +45,7 @@ struct Measurement {
 /// to linear Rec.709. Throws InputError that names the file, the field or line, and what was expected.
 Measurement read_measurement(const std::filesystem::path&, const ToRgb& to_rgb);
 /// The extensions that read_measurement() knows.
-inline constexpr std::array<const char*, 4> kExtensions{".binary", ".bsdf", ".bin", ".csv"};
+inline constexpr std::array<const char*, 6> kExtensions{".binary", ".bsdf", ".bin", ".alta", ".dat", ".csv"};
 
 /// "1 entry is" or "12 entries are"
 std::string counted(std::size_t count, const std::string& one, const std::string& many);

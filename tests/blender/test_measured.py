@@ -238,7 +238,7 @@ def test_the_operator_makes_the_closest(extension, empty, paint):
         bpy.ops.brdfc.new_measured_material(filepath=str(paint) + "x")
     handler = bpy.types.FileHandler.bl_rna_get_subclass_py("BRDFC_FH_measured")
     assert handler.bl_import_operator == "brdfc.new_measured_material"
-    assert ".binary" in handler.bl_file_extensions
+    assert handler.bl_file_extensions == ".binary;.bsdf;.bin;.alta;.dat"
 
 
 @pytest.mark.parametrize(

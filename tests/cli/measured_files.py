@@ -37,6 +37,14 @@ def utia(f):
     return np.ascontiguousarray(np.asarray(f, float).T, "<f8").tobytes()
 
 
+def alta(name, output, *columns, more=""):
+    """ALTA's text: the coordinates of a parametrisation, then the values."""
+    values = 3 if output == "RGB_COLOR" else 1
+    head = f"#DIM {len(columns) - values} {values}\n#PARAM_IN {name}\n#PARAM_OUT {output}\n{more}"
+    rows = ("\t".join(f"{x:.15g}" for x in row) for row in zip(*columns, strict=True))
+    return head + "\n".join(rows) + "\n"
+
+
 def rgl_fields(kind, seed=7):
     """A made-up material: "isotropic", "anisotropic" (half of the azimuths), "quarter" of them, or
     "spectral". Not a BRDF of anything, but every number matters."""
