@@ -14,10 +14,6 @@ from .common.i18n import say
 from .common.program import ToolJob
 from .packs import pack
 
-#: The largest number of lobes in a fitted sum: with more, renders take longer, and errors hardly
-#: fall; and in any sum.
-LOBES, MOST_LOBES = 4, 12
-
 #: What stands for the sum of lobes where a model is asked for.
 SUM = "lobes"
 
@@ -138,9 +134,9 @@ class Fitting(ToolJob):
 
     failure, command = MeasuredError, "measured"
 
-    def __init__(self, path, models="all", lobes=LOBES):
-        """`models`: one of them, "all" or "none". `lobes`: the largest number of lobes in a sum, or
-        0 for none. Raises MeasuredError."""
+    def __init__(self, path, models="all", sums=True):
+        """`models`: one of them, "all" or "none". `sums`: whether sums of lobes are fitted, too.
+        Raises MeasuredError."""
         if not path:
             raise MeasuredError(say("Expected a file with a measured BRDF, got none"))
         self._path = Path(bpy.path.abspath(str(path)))
@@ -148,8 +144,8 @@ class Fitting(ToolJob):
             raise MeasuredError(say("There is no file {file}", file=path))
         super().__init__()
         self._open_folder("brdfc-measured-")
-        sums = ("--lobes", str(lobes)) if lobes else ()
-        self._run(self._path.resolve(), "--json", "--models", models, *sums)
+        lobes = ("--lobes", str(most_lobes("fitted"))) if sums else ()
+        self._run(self._path.resolve(), "--json", "--models", models, *lobes)
 
     def _ended(self, status):
         try:
@@ -172,6 +168,11 @@ class Fitting(ToolJob):
             self._folder.cleanup()
 
 
+def most_lobes(kind):
+    """The largest number of lobes in a sum: "most" in any, "fitted" in one that is fitted."""
+    return pack.manifest()["lobes"][kind]
+
+
 def _values(entry):
     return {k: tuple(v) if isinstance(v, list) else v for k, v in entry["parameters"].items()}
 
@@ -192,9 +193,10 @@ def as_pairs(lobes):
                 given=lobes,
             )
         )
-    if len(pairs) > MOST_LOBES:
+    most = most_lobes("most")
+    if len(pairs) > most:
         raise ValueError(
-            say("Expected at most {most} lobes, got {count}", most=MOST_LOBES, count=len(pairs))
+            say("Expected at most {most} lobes, got {count}", most=most, count=len(pairs))
         )
     for model, _ in pairs:
         if pack.model(model).get("two_sided"):

@@ -20,7 +20,7 @@ from ..common.files import beside
 from ..common.i18n import say
 from ..common.jobs import Job, ProgramJob
 from ..common.program import find
-from ..measured import ENDINGS, LOBES, SUM, Fitting, MeasuredError
+from ..measured import ENDINGS, SUM, Fitting, MeasuredError
 from ..packs import pack
 from . import (
     BLEND,
@@ -94,7 +94,7 @@ class Making(Job):
         try:
             if self._fitting is None:
                 models = {None: "all", SUM: "none"}.get(self._model, self._model)
-                self._fitting = Fitting(path, models, LOBES if self._model == SUM else 0)
+                self._fitting = Fitting(path, models, sums=self._model == SUM)
             share = self._fitting.step()
             if share is not None:
                 return share

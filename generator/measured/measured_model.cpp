@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "measured/measured_model.h"
 
-#include <stdexcept>
-
-#include "measured/opaque.h"
-
 namespace brdfc::measured {
 namespace {
 
@@ -59,12 +55,10 @@ class PackedMeasured final : public OpaquePacked {
   std::unique_ptr<Brdf<double>> brdf_;
 };
 
-[[noreturn]] void no_formula() { throw std::logic_error("a measured BRDF is a table: it has no formula"); }
-
 }  // namespace
 
 MeasuredModel::MeasuredModel(const Measurement& m)
-    : info_{.name = "measured", .label = "Measured", .look = Look::Glossy},
+    : OpaqueModel({.name = "measured", .label = "Measured", .look = Look::Glossy}),
       table_(m.table),
       sampling_(std::make_shared<HalfVectors>(*m.table, m.isotropic)) {
   info_.doc = m.file;
@@ -78,8 +72,5 @@ std::unique_ptr<Brdf<double>> MeasuredModel::make_double(const ParamValues&) con
 std::unique_ptr<PackedBrdf> MeasuredModel::make_packed(const ParamValues& values) const {
   return std::make_unique<PackedMeasured>(make_double(values));
 }
-std::unique_ptr<Brdf<float>> MeasuredModel::make_float(const ParamValues&) const { no_formula(); }
-std::unique_ptr<Brdf<Wide>> MeasuredModel::make_wide(const ParamValues&) const { no_formula(); }
-std::unique_ptr<Brdf<Expr>> MeasuredModel::record(const ParamValues&) const { no_formula(); }
 
 }  // namespace brdfc::measured

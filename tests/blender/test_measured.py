@@ -138,6 +138,9 @@ def test_the_sum_of_lobes_is_added_up(extension, empty, found):
     for given in ([], None, "ward", ["ward", "lambert"], [{"model": "ward"}], [("ward", None)]):
         with pytest.raises(ValueError, match="Expected a list of lobes, each a model and a dict"):
             extension.api.new_sum(given)
+    most = extension.pack.manifest()["lobes"]["most"]
+    with pytest.raises(ValueError, match=f"Expected at most {most} lobes, got {most + 1}"):
+        extension.api.new_sum([("lambert", {})] * (most + 1))
     assert len(bpy.data.materials) == materials
 
 

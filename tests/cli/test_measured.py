@@ -933,6 +933,25 @@ def test_what_is_wrong_in_a_sum_is_said(tmp_path):
         assert done.returncode == 2 and expected in done.stderr, done.stderr
 
 
+def test_a_sum_that_reflects_more_than_it_gets_is_told(tmp_path):
+    """Of sums in scene files, as of those that are fitted; ideal mirrors count."""
+    white, half = ({"model": "lambert", "parameters": {"rho": rho}} for rho in (0.9, 0.5))
+    metal = {"model": "fresnel_conductor"}
+    for lobes, expected in (
+        ([white, half], "1.4 times seen at 0 degrees"),
+        ([half, half], None),
+        ([half, metal], "times seen at"),
+        ([white], None),
+    ):
+        content = scene(materials={"m": {"sum": lobes}}, **PLANE)
+        (tmp_path / "s.json").write_text(json.dumps(content), encoding="utf-8")
+        done = run("scene", tmp_path / "s.json", "--out", tmp_path / "out")
+        assert done.returncode == 0, done.stderr
+        said = "brdfc: materials.m.sum: the sum reflects more light than it gets: "
+        assert (said in done.stderr) == (expected is not None), done.stderr
+        assert expected is None or expected in done.stderr
+
+
 @pytest.fixture(scope="module")
 def package(tmp_path_factory):
     out = tmp_path_factory.mktemp("python")
