@@ -8,7 +8,7 @@
 
 namespace brdfc::measured {
 
-/// Looks values up.
+/// Looks values up. Of a table's own sampler and one of half vectors, the one with less noise is taken.
 class MeasuredModel final : public OpaqueModel {
  public:
   explicit MeasuredModel(const Measurement&);
@@ -17,11 +17,11 @@ class MeasuredModel final : public OpaqueModel {
   std::unique_ptr<Brdf<double>> make_double(const ParamValues&) const override;
   std::unique_ptr<PackedBrdf> make_packed(const ParamValues&) const override;
 
-  const HalfVectors& sampling() const { return *sampling_; }
+  const Sampler& sampling() const { return *sampling_; }
 
  private:
   std::shared_ptr<const Table> table_;
-  std::shared_ptr<const HalfVectors> sampling_;
+  std::shared_ptr<const Sampler> sampling_;
 };
 
 }  // namespace brdfc::measured

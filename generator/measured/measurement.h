@@ -17,9 +17,19 @@
 #include <vector>
 
 #include "core/vec.h"
+#include "model/model.h"
 #include "model/optical.h"
 
 namespace brdfc::measured {
+
+/// Importance sampling of a table.
+class Sampler {
+ public:
+  virtual ~Sampler() = default;
+  virtual double pdf(const Vec3<double>& wi, const Vec3<double>& wo) const = 0;
+  /// A direction and its pdf; the weight is left at 0. `u` is as in Brdf::sample().
+  virtual Sample<double> sample(const Vec3<double>& wo, const Vec3<double>& u) const = 0;
+};
 
 /// The values of a file. Directions and units are those of a model (model/model.h).
 class Table {
@@ -27,6 +37,8 @@ class Table {
   virtual ~Table() = default;
   /// The BRDF in 1/sr, in linear Rec.709; 0 unless both directions are above the surface. Finite and not negative.
   virtual Rgb<double> eval(const Vec3<double>& wi, const Vec3<double>& wo) const = 0;
+  /// What the file's own tables tell of where light goes, if they do.
+  virtual std::shared_ptr<const Sampler> sampler() const { return nullptr; }
 };
 
 struct Measurement {

@@ -82,6 +82,35 @@ def rgl_fields(kind, seed=7):
     return {k: a if a.dtype == np.uint8 else a.astype(np.float32) for k, a in fields.items()}
 
 
+def facets(azimuths):
+    """A file whose visible normals are those of its facets, as in files that were measured, and
+    whose other numbers are all 1; of a circle, half a circle or a quarter, as many azimuths."""
+    size, circle = 48, len(azimuths) > 1
+    u = np.linspace(0, 1, size)
+    theta, phi = np.clip(u, 1e-3, 1) ** 2 * np.pi / 2, 2 * np.pi * u - np.pi
+    m = direction(theta, phi[:, None])
+    width = 0.2 * (1 + (0.5 * np.cos(2 * phi[:, None]) if circle else 0))
+    ndf = np.exp(-((theta / width) ** 2)) + 1e-4
+    density = ndf * u * np.sin(theta)  # in the unit square
+    view = direction(np.radians(np.linspace(0, 85, 12)), np.asarray(azimuths)[:, None])
+
+    def visible(w):
+        return np.maximum(w @ m.reshape(-1, 3).T, 0).reshape(*w.shape[:-1], size, size) * density
+
+    fields = {
+        "description": np.frombuffer(b"Facets", np.uint8),
+        "jacobian": np.array([1], np.uint8),
+        "phi_i": np.asarray(azimuths),
+        "theta_i": np.radians(np.linspace(0, 85, 12)),
+        "ndf": ndf * np.ones((size, 1)),
+        # The last azimuth is the first one.
+        "sigma": 2 * np.pi**2 * visible(m)[..., :-1, :].mean((-1, -2)),
+        "vndf": visible(view),
+        "rgb": np.ones((len(azimuths), 12, 3, 8, 8)),
+    }
+    return {k: a if a.dtype == np.uint8 else a.astype(np.float32) for k, a in fields.items()}
+
+
 KINDS = ("isotropic", "anisotropic", "quarter", "spectral")
 
 
