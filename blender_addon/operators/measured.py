@@ -117,7 +117,8 @@ class BRDFC_OT_new_measured_library(ModalJob, Operator):
 
     def finish(self, context, made):
         for path, why in made.refusals.items():
-            self.report({"WARNING"}, f"{path.name}: {rpt(why)}")
+            said = say("{file}: {reason}", file=path.name, reason=why)
+            self.report({"WARNING"}, rpt(said))
         said = say(
             "{file} has {count} materials: name its folder in Preferences > File Paths > Asset "
             "Libraries to see them in the Asset Browser",
