@@ -118,6 +118,7 @@ def test_a_folder_becomes_a_catalogue(extension, empty, folder, tmp_path):
 @pytest.mark.long
 def test_the_operator_and_the_closest_model(extension, empty, tmp_path):
     write(tmp_path / "grey.csv", 0.5, 0.5, 0.5)
+    (tmp_path / "broken.alta").write_text("#DIM 4 3\n")
     assert bpy.ops.brdfc.new_measured_library(directory=str(tmp_path)) == {"FINISHED"}
     (material,) = load(tmp_path / "measured.blend").values()
     (node,) = extension.nodes.group_nodes(material)
