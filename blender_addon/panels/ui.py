@@ -71,6 +71,7 @@ def draw_add_menu(self, context):
 def draw_material_menu(self, context):
     self.layout.menu(MATERIAL_MT_brdfc.bl_idname, icon="SHADING_RENDERED")
     self.layout.operator("brdfc.new_measured_material", icon="FILE_FOLDER")
+    self.layout.operator("brdfc.new_measured_library", icon="ASSET_MANAGER")
     self.layout.operator("brdfc.convert", icon="FILE_REFRESH")
 
 

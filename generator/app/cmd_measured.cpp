@@ -55,7 +55,7 @@ Json describe(const measured::LobeSum& sum) {
                      {"share", sum.share[i]}});
   return {{"error", sum.error},
           {"lobes", lobes},
-          {"brightest", {{"albedo", sum.brightest}, {"degrees", sum.brightest_at}}},
+          {"brightest", {{"albedo", sum.brightest.albedo}, {"degrees", sum.brightest.degrees}}},
           {"seconds", sum.seconds}};
 }
 
@@ -79,9 +79,7 @@ void print_sums(const std::vector<measured::LobeSum>& sums, int asked) {
     fmt::print("  {:>6.2f} %  {} {}\n", 100 * last.share[i], info.name,
                format_values(info, measured::rounded(last.lobes[i].values)));
   }
-  if (last.brightest > 1.005)
-    fmt::print("  the sum reflects more light than it gets: {:.3g} times seen at {:g} degrees\n", last.brightest,
-               last.brightest_at);
+  if (const auto said = measured::gain_of_sum(last.brightest)) fmt::print("  {}\n", *said);
 }
 
 /// f and pdf for pairs of directions from stdin.
@@ -116,7 +114,8 @@ void add_measured_command(CLI::App& app) {
       "What a file with a measured BRDF holds, what it lacks, how much light it reflects, and every model fitted to "
       "it,\n"
       "the best first: the share of the light that the model sends in other directions, and its parameters.\n"
-      "FILE is one of the MERL database (.binary), of RGL (.bsdf), of UTIA (.bin), or a table (.csv) with the columns\n"
+      "FILE is one of the MERL database (.binary), of RGL (.bsdf), of UTIA (.bin), of ALTA as text (.alta, .dat),\n"
+      "or a table (.csv) with the columns\n"
       "theta_i,phi_i,theta_o,phi_o in degrees (theta_i_rad,... in radians), or wi_x,wi_y,wi_z,wo_x,wo_y,wo_z, and "
       "r,g,b in 1/sr, a row for every\n"
       "combination of angles. Colours are linear Rec.709.");
@@ -126,7 +125,7 @@ void add_measured_command(CLI::App& app) {
       ->delimiter(',')
       ->capture_default_str();
   CLI::Option* lobes =
-      add_number(*cmd, "--lobes", o->lobes, {1, measured::kMostLobes},
+      add_number(*cmd, "--lobes", o->lobes, {1, kMostLobes},
                  "Sums of 1, 2, ... up to this number of lobes, each with its error. Models are fitted only if\n"
                  "--models names them then");
   cmd->add_option("--from", o->from,

@@ -153,6 +153,7 @@ Measurement read_merl(const std::filesystem::path& path) {
   out.file = file.name();
   out.format = "MERL";
   out.grid = fmt::format("{} x {} x {} cells of theta_h, theta_d and phi_d", kMerlThetaH, kMerlThetaD, kMerlPhiD);
+  out.largest = largest(values);
   out.table = std::make_shared<Merl>(std::move(values));
   return out;
 }

@@ -46,6 +46,7 @@ Measurement read_utia(const std::filesystem::path& path) {
   out.grid = fmt::format("{0} x {1} directions of light, {0} x {1} of view", kThetas, kPhis);
   out.isotropic = false;
   out.highest = kThetaStep * double(kThetas - 1);
+  out.largest = largest(table->values);
   out.table = std::move(table);
   return out;
 }

@@ -122,8 +122,8 @@ class MaterialReader {
       if (!model->two_sided()) names.push_back(name);
     std::vector<measured::Lobe> lobes;
     const JsonView list = m.at("sum");
-    if (!list.json().is_array() || list.json().empty() || list.json().size() > measured::kMostLobes)
-      list.fail(fmt::format("1 to {} lobes", measured::kMostLobes));
+    if (!list.json().is_array() || list.json().empty() || list.json().size() > kMostLobes)
+      list.fail(fmt::format("1 to {} lobes", kMostLobes));
     for (const JsonView& each : list.elements()) {
       each.only({"model", "parameters"});
       measured::Lobe lobe{&find_model(each.at("model").choice(names)), {}};
@@ -139,6 +139,10 @@ class MaterialReader {
       lobes.push_back(std::move(lobe));
     }
     set_sum(std::move(lobes), material, resolved);
+    const auto brdf = material.model->make_double({});
+    if (const auto said =
+            measured::gain_of_sum(measured::brightest_view(*brdf, material.model->info().properties.isotropic)))
+      files_.note(fmt::format("{}: {}", list.key(), *said));
   }
 
   static void set_sum(std::vector<measured::Lobe> lobes, Material& material, json& resolved) {
@@ -206,7 +210,7 @@ class MaterialReader {
     if (name == "lobes") {
       const auto most = m.find("lobes");
       const auto sums = measured::fit_lobes(measurement, *table, measured::lobe_kinds({}, measurement.isotropic),
-                                            most ? std::size_t(most->integer(1, measured::kMostLobes)) : 4);
+                                            most ? std::size_t(most->integer(1, kMostLobes)) : kFittedLobes);
       if (sums.empty()) as->error("is a sum of nothing: the data are black");
       const measured::LobeSum& sum = sums.back();
       std::vector<std::string> each;
@@ -214,9 +218,7 @@ class MaterialReader {
         each.push_back(lobe.model->info().name + " " + described(lobe.model->info(), lobe.values));
       misplaces("a sum of " + measured::counted(sum.lobes.size(), "lobe", "lobes"), sum.error,
                 fmt::format("{}", fmt::join(each, " + ")));
-      if (sum.brightest > 1.005)
-        files_.note(fmt::format("{}: the sum reflects more light than it gets: {:.3g} times seen at {:g} degrees",
-                                measurement.file, sum.brightest, sum.brightest_at));
+      if (const auto said = measured::gain_of_sum(sum.brightest)) files_.note(measurement.file + ": " + *said);
       set_sum(sum.lobes, material, resolved);
       return;
     }

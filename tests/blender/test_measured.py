@@ -138,6 +138,9 @@ def test_the_sum_of_lobes_is_added_up(extension, empty, found):
     for given in ([], None, "ward", ["ward", "lambert"], [{"model": "ward"}], [("ward", None)]):
         with pytest.raises(ValueError, match="Expected a list of lobes, each a model and a dict"):
             extension.api.new_sum(given)
+    most = extension.pack.manifest()["lobes"]["most"]
+    with pytest.raises(ValueError, match=f"Expected at most {most} lobes, got {most + 1}"):
+        extension.api.new_sum([("lambert", {})] * (most + 1))
     assert len(bpy.data.materials) == materials
 
 
@@ -238,7 +241,7 @@ def test_the_operator_makes_the_closest(extension, empty, paint):
         bpy.ops.brdfc.new_measured_material(filepath=str(paint) + "x")
     handler = bpy.types.FileHandler.bl_rna_get_subclass_py("BRDFC_FH_measured")
     assert handler.bl_import_operator == "brdfc.new_measured_material"
-    assert ".binary" in handler.bl_file_extensions
+    assert handler.bl_file_extensions == ".binary;.bsdf;.bin;.alta;.dat"
 
 
 @pytest.mark.parametrize(
