@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from .. import lamps
 from ..common import editable
-from ..common.i18n import Sentence, say
+from ..common.i18n import Sentence, in_percent, say
 from ..groups import nodes
 from ..nearest import layer, native_bsdf
 from ..nearest.native_bsdf import Native
@@ -100,7 +100,7 @@ class Plan(Part):
         return self.label
 
     def _percent(self):
-        low, high = (f"{100 * error:.2g}" for error in (self.least_error, self.error))
+        low, high = map(in_percent, (self.least_error, self.error))
         return high if low == high else say("{low} to {high}", low=low, high=high)
 
     def line(self):

@@ -8,7 +8,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy.types import FileHandler, Operator
 
 from .. import api
-from ..common.i18n import Sentence, iface, rpt, say
+from ..common.i18n import Sentence, iface, in_percent, rpt, say
 from ..groups import nodes
 from ..measured import ENDINGS, SUM
 from ..packs import pack
@@ -150,7 +150,7 @@ def _fits_as_items(_operator, _context):
                 say(
                     "{model}: {percent} % of the light in other directions",
                     model=pack.model(fit.model)["label"],
-                    percent=f"{100 * fit.error:.2g}",
+                    percent=in_percent(fit.error),
                 )
             ),
             pack.model(fit.model)["doc"],
@@ -166,7 +166,7 @@ def _sum_as_item(found):
     said = say(
         "Sum of {count} lobes: {percent} % of the light in other directions",
         count=len(found.lobes),
-        percent=f"{100 * found.error:.2g}",
+        percent=in_percent(found.error),
     )
     names = " + ".join(pack.model(lobe.model)["label"] for lobe in found.lobes)
     return (SUM, iface(said), names)
@@ -207,7 +207,7 @@ class BRDFC_OT_choose_measured(Operator):
                 say(
                     "{model}: {percent} %",
                     model=pack.model(lobe.model)["label"],
-                    percent=f"{100 * lobe.share:.2g}",
+                    percent=in_percent(lobe.share),
                 )
                 for lobe in self.found.lobe_sum().lobes
             )
@@ -218,7 +218,7 @@ class BRDFC_OT_choose_measured(Operator):
         if fit.matte:
             grey = sum(fit.matte) / 3
             said = say(
-                "A matte surface that reflects {percent} % is added", percent=f"{100 * grey:.2g}"
+                "A matte surface that reflects {percent} % is added", percent=in_percent(grey)
             )
             wrapped(self.layout.column(align=True), said, pixels=480)
 

@@ -9,7 +9,7 @@ from bpy.types import Menu, Panel
 
 from .. import convert, lamps
 from ..common import color, editable
-from ..common.i18n import form_name, iface, of_error, say
+from ..common.i18n import form_name, iface, in_percent, of_error, say
 from ..content import group_content
 from ..groups import nodes
 from ..packs import device, energy, kernel, optical, pack
@@ -98,7 +98,7 @@ def percent(part):
     """A fraction in percent; rounding errors count as 0."""
     if part < ROUNDING:
         return say("none")
-    return say("{percent} %", percent=f"{100 * part:.2g}")
+    return say("{percent} %", percent=in_percent(part))
 
 
 #: Smaller errors are rounding errors of single precision.

@@ -8,6 +8,7 @@
 #include "app/commands.h"
 #include "app/numbers.h"
 #include "core/csv.h"
+#include "core/text.h"
 #include "measured/findings.h"
 #include "measured/fit_lobes.h"
 #include "measured/fit_models.h"
@@ -205,12 +206,12 @@ void add_measured_command(CLI::App& app) {
       for (const std::string& sentence : *sentences) fmt::print("  {}\n", sentence);
     if (!fits.empty()) fmt::print("\n  {:<22}{:>10}  {:>6}  parameters\n", "model", "misplaced", "time");
     for (const measured::ModelFit& f : fits)
-      fmt::print(
-          "  {:<22}{:>8.2f} %  {:>4.1f} s  {}{}\n", f.model->info().name, 100 * f.error, f.seconds,
-          format_values(f.model->info(), measured::rounded(f.values)),
-          (f.matte ? fmt::format(" and Lambert {:.4g},{:.4g},{:.4g}", f.matte->r, f.matte->g, f.matte->b) : "") +
-              (f.mirror > 0 ? fmt::format("; its mirror, {:.2g} % of a white world, is not in the data", 100 * f.mirror)
-                            : ""));
+      fmt::print("  {:<22}{:>8.2f} %  {:>4.1f} s  {}{}\n", f.model->info().name, 100 * f.error, f.seconds,
+                 format_values(f.model->info(), measured::rounded(f.values)),
+                 (f.matte ? fmt::format(" and Lambert {:.4g},{:.4g},{:.4g}", f.matte->r, f.matte->g, f.matte->b) : "") +
+                     (f.mirror > 0
+                          ? fmt::format("; its mirror, {} % of a white world, is not in the data", in_percent(f.mirror))
+                          : ""));
     if (o->lobes) print_sums(sums, *o->lobes);
   });
 }

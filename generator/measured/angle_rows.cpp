@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/text.h"
 
 namespace brdfc::measured {
 namespace {
@@ -169,8 +170,8 @@ std::optional<std::string> AngleRows::contradiction() const {
   double spread = 0;
   for (const auto& [angles, entry] : rows_) spread = std::max(spread, entry.spread());
   if (spread > kAlike)
-    return fmt::format("rows of one direction along the normal differ by up to {:.2g} %: their mean is taken",
-                       100 * spread);
+    return fmt::format("rows of one direction along the normal differ by up to {} %: their mean is taken",
+                       in_percent(spread));
   return std::nullopt;
 }
 

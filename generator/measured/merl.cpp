@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "measured/binary_file.h"
 
 namespace brdfc::measured {
@@ -144,9 +145,9 @@ Measurement read_merl(const std::filesystem::path& path) {
   if (holes == above) input_error("{}: expected values above the horizon, found none", file.name());
   if (holes)
     out.notes.push_back(
-        fmt::format("{} of {} above the horizon are negative, {:.2g} %: not measured, filled from cells "
+        fmt::format("{} of {} above the horizon are negative, {} %: not measured, filled from cells "
                     "beside them",
-                    counted(holes, "entry", "entries"), above, 100 * double(holes) / double(above)));
+                    counted(holes, "entry", "entries"), above, in_percent(double(holes) / double(above))));
   if (clipped)
     out.notes.push_back(fmt::format("{} negative in one channel or two: taken for 0 there",
                                     counted(clipped, "entry is", "entries are")));

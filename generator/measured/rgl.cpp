@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "measured/tensor_file.h"
 #include "measured/warp.h"
 #include "model/sampling.h"
@@ -275,9 +276,9 @@ Measurement read_rgl(const std::filesystem::path& path, const ToRgb& to_rgb) {
         }
       }
     if (negative)
-      out.notes.push_back(fmt::format("{} negative in Rec.709, {:.2g} %: f is taken for 0 where they make it negative",
+      out.notes.push_back(fmt::format("{} negative in Rec.709, {} %: f is taken for 0 where they make it negative",
                                       counted(negative, "number is", "numbers are"),
-                                      100 * double(negative) / double(3 * slices * size)));
+                                      in_percent(double(negative) / double(3 * slices * size))));
   }
   table->light = Warp(sum_of(planes, width * height), width, height, true);
   for (std::size_t c = 0; c < 3; ++c) table->rgb[c] = Warp(std::move(planes[c]), width, height, false);

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "core/hash.h"
+#include "core/text.h"
 #include "measured/fit_lobes.h"
 #include "measured/fit_models.h"
 #include "model/optical.h"
@@ -205,7 +206,7 @@ class MaterialReader {
     }
     const auto misplaces = [&](const std::string& what, double error, const std::string& values) {
       files_.note(
-          fmt::format("{}: {} misplaces {:.2g} % of the light: {}", measurement.file, what, 100 * error, values));
+          fmt::format("{}: {} misplaces {} % of the light: {}", measurement.file, what, in_percent(error), values));
     };
     if (name == "lobes") {
       const auto most = m.find("lobes");
@@ -228,8 +229,8 @@ class MaterialReader {
     const measured::ModelFit& fit = fits.front();
     const ModelInfo& info = fit.model->info();
     if (fit.mirror > 0)
-      files_.note(fmt::format("{}: {} has a mirror, {:.2g} % of a white world, which is not in the data",
-                              measurement.file, info.name, 100 * fit.mirror));
+      files_.note(fmt::format("{}: {} has a mirror, {} % of a white world, which is not in the data", measurement.file,
+                              info.name, in_percent(fit.mirror)));
     if (fit.matte) {
       const Model& lambert = find_model("lambert");
       const ParamValues rho{{"rho", std::array<double, 3>{fit.matte->r, fit.matte->g, fit.matte->b}}};
