@@ -373,7 +373,9 @@ def plan_conversion(materials, limit=convert.LIMIT):
     limit = argument_checks.number(limit)
     return [
         p.within(limit)
-        for p in convert.plan(argument_checks.each(argument_checks.material, materials))
+        for p in convert.plan(
+            dict.fromkeys(argument_checks.each(argument_checks.material, materials))
+        )
     ]
 
 

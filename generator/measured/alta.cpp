@@ -16,7 +16,6 @@
 namespace brdfc::measured {
 namespace {
 
-constexpr double kDegrees = 180 / kPi;
 /// A view closer to the horizon, by its cosine, has no value that a weight by this cosine leaves.
 constexpr double kLowest = 1e-6;
 

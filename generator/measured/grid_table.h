@@ -8,6 +8,9 @@
 
 namespace brdfc::measured {
 
+/// Degrees of a radian.
+inline constexpr double kDegrees = 180 / kPi;
+
 /// Angles in degrees, increasing.
 struct AngleAxis {
   enum class Ends {

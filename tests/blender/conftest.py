@@ -100,6 +100,7 @@ def extension(extension_zip):
     assert PACKAGE in bpy.context.preferences.addons
     modules = (
         "api",
+        "common.files",
         "content.group_content",
         "groups.nodes",
         "lean",

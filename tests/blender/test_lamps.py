@@ -718,8 +718,16 @@ def test_flat_meshes_are_area_lamps(extension, ball, empty):
     (slot,) = slots(empty)
     assert slot[9] == 4 and sorted(slot[10:12]) == pytest.approx([2, 4], rel=0.02)
     bpy.data.objects.remove(bpy.data.objects["Panel"])
-    corner = [(0, 0), (2, 0), (2, 0.4), (0.4, 0.4), (0.4, 2), (0, 2)]
-    emissive_plane(empty, material, corner).location.z = 6
+    # Random rays meet the first of these two seldom, though it is wide.
+    for size, why in ((1.0, "neither flat, round nor small"), (6.0, "so large or near")):
+        corner = np.array([(0, 0), (2, 0), (2, 0.4), (0.4, 0.4), (0.4, 2), (0, 2)])
+        item = emissive_plane(empty, material, [tuple(c) for c in corner * (size, size)])
+        item.location.z = 6
+        (lamp,) = extension.api.see_lamps(empty)
+        assert lamp.slot is None and why in lamp.why
+        bpy.data.objects.remove(item)
+    tube = helpers.add_sphere(empty, material, segments=16)
+    tube.location, tube.scale = (2, 0, 1), (0.03, 0.03, 1)
     (lamp,) = extension.api.see_lamps(empty)
     assert lamp.slot is None and "neither flat, round nor small" in lamp.why
 
