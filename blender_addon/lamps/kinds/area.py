@@ -57,5 +57,8 @@ class Area(Light):
     def is_sizeless(self, light):
         return False
 
+    def is_distorted(self, matrix):
+        return slots.is_sheared(matrix)
+
     def is_lamp(self, light):
         return not light.cycles.is_portal and super().is_lamp(light)

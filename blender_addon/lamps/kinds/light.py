@@ -96,6 +96,10 @@ class Light(Kind, ABC):
         one closure, with f towards one random point of the light."""
         return False
 
+    def is_distorted(self, matrix):
+        """Whether a transform makes another shape of it than Cycles' light sampling assumes."""
+        return False
+
     def is_like_new(self, light):
         """Whether it is of the type of a new light in Blender, no brighter and no smaller."""
         return False
