@@ -11,6 +11,7 @@
 #include "core/parse.h"
 #include "measured/angle_rows.h"
 #include "measured/binary_file.h"
+#include "measured/gaps.h"
 #include "measured/merl.h"
 
 namespace brdfc::measured {
@@ -193,6 +194,17 @@ bool below_horizon(const std::array<double, 4>& a) {
   return !(view.z > 1e-9 && light.z > 1e-9);
 }
 
+/// Fills what was not measured above the horizon. `phi_d` is in degrees, as in the file.
+void fill(HalfGridTable& table, const std::vector<double>& phi_d) {
+  std::vector<bool> above;
+  for (const double h : table.theta_h.at)
+    for (const double p : table.phi_h.at)
+      for (const double d : table.theta_d.at)
+        for (const double q : phi_d) above.push_back(!below_horizon({h, p, d, q}));
+  const std::array<const AngleAxis*, 4> axes{&table.theta_h, &table.phi_h, &table.theta_d, &table.phi_d};
+  fill_gaps(table.values, axes, std::array<std::size_t, 4>{2, 3, 0, 1}, above);
+}
+
 /// The half circle or quarter in which all azimuths lie, in steps.
 HalfGridTable::Azimuths azimuths_of(const std::set<long>& phi_d) {
   using Azimuths = HalfGridTable::Azimuths;
@@ -220,6 +232,7 @@ void read_half_grid(AngleRows& rows, Measurement& out) {
   if (table->phi_h.at.size() > 1) add_gaps("phi_h", table->phi_h.at, out.notes);
   using Azimuths = HalfGridTable::Azimuths;
   AngleAxis& phi_d = table->phi_d;
+  const std::vector<double> given_phi_d = phi_d.at;
   table->azimuths = azimuths_of(rows.axis(3));
   if (phi_d.at.size() == 1) {
     out.notes.emplace_back("phi_d has one value: the data are taken for the same at all");
@@ -234,6 +247,7 @@ void read_half_grid(AngleRows& rows, Measurement& out) {
     // With 0 and 180 degrees both ends are there; otherwise the last value is followed by the first.
     phi_d.ends = phi_d.at.back() - phi_d.at.front() < 360 ? AngleAxis::Ends::Circle : AngleAxis::Ends::Constant;
   }
+  fill(*table, given_phi_d);
   out.grid = fmt::format("{} x {} half vectors, {} x {} difference vectors", table->theta_h.at.size(),
                          table->phi_h.at.size(), table->theta_d.at.size(), phi_d.at.size());
   out.isotropic = table->phi_h.at.size() == 1;
@@ -336,8 +350,8 @@ Measurement read_alta(const std::filesystem::path& path) {
   if (lowest)
     out.notes.push_back(fmt::format("{} of a view at the horizon left out", counted(lowest, "row is", "rows are")));
   if (holes)
-    out.notes.push_back(fmt::format("{} above the horizon negative: not measured, filled from places beside them",
-                                    counted(holes, "place is", "places are")));
+    out.notes.push_back(fmt::format("{} above the horizon negative: not measured, {}",
+                                    counted(holes, "place is", "places are"), kFilled));
   if (negative)
     out.notes.push_back(fmt::format("{} negative: taken for 0", counted(negative, "number is", "numbers are")));
   if (half)
