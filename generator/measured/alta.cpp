@@ -229,7 +229,10 @@ void read_half_grid(AngleRows& rows, Measurement& out) {
       out.notes.push_back(fmt::format("{}: measured from {:g} to {:g} degrees: the values at these ends hold beyond",
                                       title, of->at.front(), of->at.back()));
   table->phi_h.ends = AngleAxis::Ends::Circle;
-  if (table->phi_h.at.size() > 1) add_gaps("phi_h", table->phi_h.at, out.notes);
+  const std::array sizes{table->theta_h.at.size(), table->phi_h.at.size(), table->theta_d.at.size(),
+                         table->phi_d.at.size()};
+  const bool phi_d_matters = vary(table->values, sizes, 3);
+  if (table->phi_h.at.size() > 1) add_gaps("phi_h", table->phi_h.at, 360, vary(table->values, sizes, 1), out.notes);
   using Azimuths = HalfGridTable::Azimuths;
   AngleAxis& phi_d = table->phi_d;
   const std::vector<double> given_phi_d = phi_d.at;
@@ -241,11 +244,13 @@ void read_half_grid(AngleRows& rows, Measurement& out) {
   } else {
     if (table->azimuths == Azimuths::Half) {
       out.notes.emplace_back("phi_d lies within half a circle: light and view are taken for exchangeable");
-      for (double& v : phi_d.at) v *= 2;
     }
-    if (table->azimuths == Azimuths::Circle) add_gaps("phi_d", phi_d.at, out.notes);
+    const double turn = table->azimuths == Azimuths::Half ? 180 : 360;
     // With 0 and 180 degrees both ends are there; otherwise the last value is followed by the first.
-    phi_d.ends = phi_d.at.back() - phi_d.at.front() < 360 ? AngleAxis::Ends::Circle : AngleAxis::Ends::Constant;
+    const bool whole = phi_d.at.back() - phi_d.at.front() == turn;
+    add_gaps("phi_d", phi_d.at, whole ? 0 : turn, phi_d_matters, out.notes);
+    phi_d.ends = whole ? AngleAxis::Ends::Constant : AngleAxis::Ends::Circle;
+    for (double& v : phi_d.at) v *= 360 / turn;
   }
   fill(*table, given_phi_d);
   out.grid = fmt::format("{} x {} half vectors, {} x {} difference vectors", table->theta_h.at.size(),

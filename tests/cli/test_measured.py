@@ -342,6 +342,41 @@ def test_what_a_table_leaves_out_is_said(tmp_path):
     assert said.startswith("rows of one direction along the normal differ by up to 48 %")
 
 
+def test_azimuths_that_are_far_apart_are_told(tmp_path):
+    """A goniometer that measures the plane of incidence alone tells nothing of what is beside it;
+    data that don't depend on azimuth lose nothing."""
+    theta, told_of = [0, 30, 60], {}
+    for kind, bend in (("constant", 0), ("plane", 1)):
+        for azimuths in ([0, 180], [0, 60, 180], [0, 90, 180], [0, 120, 240], [0, 60, 180, 240]):
+            ti, pi, to, po = grid(theta, [0], theta, azimuths)
+            bent = np.sin(np.radians(ti)) * np.sin(np.radians(to)) * np.cos(np.radians(po))
+            f = 0.2 + 0.1 * bend * bent
+            file = tmp_path / "m.csv"
+            file.write_text(angle_table(ti, pi, to, po, f, f, f), encoding="utf-8")
+            notes = [n for n in told(file)["notes"] if "nothing was measured" in n]
+            told_of[kind, *azimuths] = notes
+    assert not any(notes for (kind, *_), notes in told_of.items() if kind == "constant")
+    start, end = "phi_o: nothing was measured from ", " degrees: linear between these"
+    assert told_of["plane", 0, 180] == [f"{start}0 to 180{end}"]
+    assert told_of["plane", 0, 60, 180] == [f"{start}60 to 180{end}"]
+    assert told_of["plane", 0, 90, 180] == []
+    assert told_of["plane", 0, 120, 240] == [
+        f"{start}0 to 120, from 120 to 240, from 240 to 360{end}"
+    ]
+    assert told_of["plane", 0, 60, 180, 240] == [f"{start}60 to 180, from 240 to 360{end}"]
+    # ALTA's azimuths of the light from the view, and those of the view about the half vector.
+    tv, tl, dp = (a.ravel() for a in np.meshgrid(*np.radians([theta, theta, [0, 60, 180]])))
+    file = tmp_path / "m.alta"
+    f = 0.2 + 0.1 * np.sin(tv) * np.cos(dp)
+    file.write_text(alta("ISOTROPIC_TV_TL_DPHI", "INV_STERADIAN", tv, tl, dp, f))
+    assert f"{start}60 to 180{end}" in told(file)["notes"]
+    file.write_text(alta("RUSIN_TH_TD_PD", "INV_STERADIAN", tv, tl, dp, 0.2 + 0 * f))
+    assert not any("nothing was measured" in note for note in told(file)["notes"])
+    f = 0.2 + 0.1 * np.sin(tl) * np.cos(2 * dp)
+    file.write_text(alta("RUSIN_TH_TD_PD", "INV_STERADIAN", tv, tl, dp, f))
+    assert f"phi_d: nothing was measured from 60 to 180{end}" in told(file)["notes"]
+
+
 def test_headers_are_read_as_programs_write_them(tmp_path):
     """Quotes, capitals, spaces, byte order mark and CR LF; other columns are named."""
     file = tmp_path / "m.csv"
