@@ -411,6 +411,33 @@ def test_every_model_is_fitted_to_data_that_are_almost_black(tmp_path):
     assert fits["factors"]["error"] == 0 and fits["lambert"]["error"] == 0
 
 
+def test_why_a_model_stands_below_one_with_a_larger_error_is_said(tmp_path):
+    """The light of a mirror, which data do not hold, counts in the order alone; and none of less
+    than 0.005 % is worth a word."""
+    file = tmp_path / "m.csv"
+    ti, pi, to, po = grid(range(0, 86, 15), [0], range(0, 86, 15), range(0, 181, 15))
+
+    def printed(f, models):
+        file.write_text(angle_table(ti, pi, to, po, f, f, f), encoding="utf-8")
+        done = run("measured", file, "--models", models)
+        assert done.returncode == 0, done.stderr
+        lines = done.stdout.partition("misplaced")[2].splitlines()[1:]
+        rows = [re.match(r"  (\w+) +([\d.]+) %", line) for line in lines]
+        return [(row[1], float(row[2])) for row in rows if row], lines
+
+    wi, wo = vector(ti, pi), vector(to, po)
+    rows, lines = printed(2 * glossy(wi, wo, 4)[:, 2], "schlick,lambert")
+    assert [model for model, _ in rows] == ["lambert", "schlick"] and rows[0][1] > rows[1][1]
+    assert "its mirror" in lines[1]
+    assert lines[2:] == [
+        "  the order counts the light of a mirror as misplaced, which the column does not"
+    ]
+    rim = 0.05 + 0.2 * (1 - unit(wi + wo)[:, 2] ** 2)
+    rows, lines = printed(rim, "lambert,oren_nayar,coupled")
+    assert [model for model, _ in rows] == ["oren_nayar", "lambert", "coupled"]
+    assert len(lines) == 3 and "mirror" not in lines[2], lines
+
+
 def test_radians_are_named_or_refused(tmp_path):
     file = tmp_path / "m.csv"
     axes = grid(range(0, 91, 15), [0], range(0, 91, 15), range(0, 181, 15))
