@@ -11,6 +11,7 @@
 #include "core/parse.h"
 #include "measured/angle_rows.h"
 #include "measured/binary_file.h"
+#include "measured/gaps.h"
 #include "measured/merl.h"
 
 namespace brdfc::measured {
@@ -192,6 +193,17 @@ bool below_horizon(const std::array<double, 4>& a) {
   return !(view.z > 1e-9 && light.z > 1e-9);
 }
 
+/// Fills what was not measured above the horizon. `phi_d` is in degrees, as in the file.
+void fill(HalfGridTable& table, const std::vector<double>& phi_d) {
+  std::vector<bool> above;
+  for (const double h : table.theta_h.at)
+    for (const double p : table.phi_h.at)
+      for (const double d : table.theta_d.at)
+        for (const double q : phi_d) above.push_back(!below_horizon({h, p, d, q}));
+  const std::array<const AngleAxis*, 4> axes{&table.theta_h, &table.phi_h, &table.theta_d, &table.phi_d};
+  fill_gaps(table.values, axes, std::array<std::size_t, 4>{2, 3, 0, 1}, above);
+}
+
 /// The half circle or quarter in which all azimuths lie, in steps.
 HalfGridTable::Azimuths azimuths_of(const std::set<long>& phi_d) {
   using Azimuths = HalfGridTable::Azimuths;
@@ -216,9 +228,13 @@ void read_half_grid(AngleRows& rows, Measurement& out) {
       out.notes.push_back(fmt::format("{}: measured from {:g} to {:g} degrees: the values at these ends hold beyond",
                                       title, of->at.front(), of->at.back()));
   table->phi_h.ends = AngleAxis::Ends::Circle;
-  if (table->phi_h.at.size() > 1) add_gaps("phi_h", table->phi_h.at, out.notes);
+  const std::array sizes{table->theta_h.at.size(), table->phi_h.at.size(), table->theta_d.at.size(),
+                         table->phi_d.at.size()};
+  const bool phi_d_matters = vary(table->values, sizes, 3);
+  if (table->phi_h.at.size() > 1) add_gaps("phi_h", table->phi_h.at, 360, vary(table->values, sizes, 1), out.notes);
   using Azimuths = HalfGridTable::Azimuths;
   AngleAxis& phi_d = table->phi_d;
+  const std::vector<double> given_phi_d = phi_d.at;
   table->azimuths = azimuths_of(rows.axis(3));
   if (phi_d.at.size() == 1) {
     out.notes.emplace_back("phi_d has one value: the data are taken for the same at all");
@@ -227,12 +243,15 @@ void read_half_grid(AngleRows& rows, Measurement& out) {
   } else {
     if (table->azimuths == Azimuths::Half) {
       out.notes.emplace_back("phi_d lies within half a circle: light and view are taken for exchangeable");
-      for (double& v : phi_d.at) v *= 2;
     }
-    if (table->azimuths == Azimuths::Circle) add_gaps("phi_d", phi_d.at, out.notes);
+    const double turn = table->azimuths == Azimuths::Half ? 180 : 360;
     // With 0 and 180 degrees both ends are there; otherwise the last value is followed by the first.
-    phi_d.ends = phi_d.at.back() - phi_d.at.front() < 360 ? AngleAxis::Ends::Circle : AngleAxis::Ends::Constant;
+    const bool whole = phi_d.at.back() - phi_d.at.front() == turn;
+    add_gaps("phi_d", phi_d.at, whole ? 0 : turn, phi_d_matters, out.notes);
+    phi_d.ends = whole ? AngleAxis::Ends::Constant : AngleAxis::Ends::Circle;
+    for (double& v : phi_d.at) v *= 360 / turn;
   }
+  fill(*table, given_phi_d);
   out.grid = fmt::format("{} x {} half vectors, {} x {} difference vectors", table->theta_h.at.size(),
                          table->phi_h.at.size(), table->theta_d.at.size(), phi_d.at.size());
   out.isotropic = table->phi_h.at.size() == 1;
@@ -335,8 +354,8 @@ Measurement read_alta(const std::filesystem::path& path) {
   if (lowest)
     out.notes.push_back(fmt::format("{} of a view at the horizon left out", counted(lowest, "row is", "rows are")));
   if (holes)
-    out.notes.push_back(fmt::format("{} above the horizon negative: not measured, filled from places beside them",
-                                    counted(holes, "place is", "places are")));
+    out.notes.push_back(fmt::format("{} above the horizon negative: not measured, {}",
+                                    counted(holes, "place is", "places are"), kFilled));
   if (negative)
     out.notes.push_back(fmt::format("{} negative: taken for 0", counted(negative, "number is", "numbers are")));
   if (half)

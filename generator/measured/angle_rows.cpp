@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -14,6 +15,8 @@ namespace {
 constexpr double kStep = 1e-4;
 /// Rows of the direction along the normal may differ by this share without a note.
 constexpr double kAlike = 1e-3;
+/// Between azimuths that are farther apart, in degrees, most of what a BRDF does is not measured.
+constexpr double kWide = 90;
 
 /// The angles of an axis, of which those that rounding made different are the same.
 std::map<long, long> without_rounding(const std::set<long>& values) {
@@ -175,16 +178,42 @@ std::optional<std::string> AngleRows::contradiction() const {
   return std::nullopt;
 }
 
-void add_gaps(const char* name, const std::vector<double>& at, std::vector<std::string>& notes) {
-  std::vector<double> gaps;
-  for (std::size_t k = 0; k < at.size(); ++k) gaps.push_back((k + 1 < at.size() ? at[k + 1] : at[0] + 360) - at[k]);
-  const auto widest = std::ranges::max_element(gaps);
-  const std::size_t from = std::size_t(widest - gaps.begin());
-  const double width = *widest;
-  *widest = 0;
-  if (width > 2 * *std::ranges::max_element(gaps))
-    notes.push_back(fmt::format("{}: nothing was measured from {:g} to {:g} degrees: linear between these", name,
-                                at[from], from + 1 < at.size() ? at[from + 1] : at[0] + 360));
+bool vary(const std::vector<std::array<float, 3>>& values, const std::array<std::size_t, 4>& sizes, std::size_t along) {
+  std::size_t stride = 1;
+  for (std::size_t k = along + 1; k < 4; ++k) stride *= sizes[k];
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (i / stride % sizes[along] != 0) continue;
+    for (std::size_t c = 0; c < 3; ++c) {
+      float least = INFINITY, most = 0;
+      for (std::size_t k = 0; k < sizes[along]; ++k)
+        if (const float v = values[i + k * stride][c]; !std::isnan(v))
+          least = std::min(least, v), most = std::max(most, v);
+      if (most - least > float(kAlike) * most) return true;
+    }
+  }
+  return false;
+}
+
+void add_gaps(const char* name, const std::vector<double>& at, double turn, bool vary,
+              std::vector<std::string>& notes) {
+  struct Gap {
+    double from, to;
+    double width() const { return to - from; }
+  };
+  std::vector<Gap> gaps;
+  for (std::size_t k = 0; k + 1 < at.size(); ++k) gaps.push_back({at[k], at[k + 1]});
+  if (turn > 0) gaps.push_back({at.back(), at[0] + turn});
+  std::vector<double> widths{0, 0};
+  for (const Gap& gap : gaps) widths.push_back(gap.width());
+  std::ranges::sort(widths, std::greater{});
+  const double widest = widths[0], next = widths[1];
+  std::vector<std::string> said;
+  for (const Gap& gap : gaps)
+    if ((turn > 0 && gap.width() == widest && widest > 2 * next) || (vary && gap.width() > kWide))
+      said.push_back(fmt::format("{:g} to {:g}", gap.from, gap.to));
+  if (!said.empty())
+    notes.push_back(fmt::format("{}: nothing was measured from {} degrees: linear between these", name,
+                                fmt::join(said, ", from ")));
 }
 
 void read_grid_of_directions(const AngleRows& rows, Measurement& out) {
@@ -203,14 +232,14 @@ void read_grid_of_directions(const AngleRows& rows, Measurement& out) {
   for (const auto& [axis, title] : {std::pair(&table->theta_i, "theta_i"), std::pair(&table->theta_o, "theta_o")})
     if (axis->at[0] > 0)
       notes.push_back(fmt::format("{} begins at {:g} degrees: its values there hold below", title, axis->at[0]));
-  if (!isotropic) add_gaps("phi_i", table->phi_i.at, notes);
+  const std::array sizes{axes[0]->at.size(), axes[1]->at.size(), axes[2]->at.size(), axes[3]->at.size()};
+  if (!isotropic) add_gaps("phi_i", table->phi_i.at, 360, vary(table->values, sizes, 1), notes);
+  add_gaps("phi_o", table->phi_o.at, table->mirrored ? 0 : 360, vary(table->values, sizes, 3), notes);
   if (table->mirrored) {
     notes.emplace_back("phi_o lies within half a circle: the other half is taken for its mirror image");
     if (table->phi_o.at[0] > 0 || table->phi_o.at.back() < 180)
       notes.push_back(fmt::format("phi_o: measured from {:g} to {:g} degrees: the values at these ends hold beyond",
                                   table->phi_o.at[0], table->phi_o.at.back()));
-  } else {
-    add_gaps("phi_o", table->phi_o.at, notes);
   }
   out.grid = fmt::format("{} x {} directions of light, {} x {} of view", table->theta_i.at.size(),
                          table->phi_i.at.size(), table->theta_o.at.size(), table->phi_o.at.size());

@@ -79,7 +79,12 @@ class AngleRows {
 
 /// A BRDF over the angles of light and view, of which the first two are the light's, and what is assumed of it.
 void read_grid_of_directions(const AngleRows&, Measurement&);
-/// Sentences on what an axis of azimuths leaves out.
-void add_gaps(const char* name, const std::vector<double>& at, std::vector<std::string>& notes);
+/// Whether the values of a grid with axes of these sizes change along one of them; NaN is
+/// left out.
+bool vary(const std::vector<std::array<float, 3>>& values, const std::array<std::size_t, 4>& sizes, std::size_t along);
+/// Adds a sentence on what an axis of azimuths leaves out: a gap that is far wider than the others, and, where values
+/// `vary` along the axis, gaps of more than a quarter of a circle. After `turn` degrees the first azimuth follows the
+/// last one; 0: it does not.
+void add_gaps(const char* name, const std::vector<double>& at, double turn, bool vary, std::vector<std::string>& notes);
 
 }  // namespace brdfc::measured

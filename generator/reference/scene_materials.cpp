@@ -228,7 +228,7 @@ class MaterialReader {
     if (fits.empty()) as->error("lets light through, which no measured BRDF shows: expected another model");
     const measured::ModelFit& fit = fits.front();
     const ModelInfo& info = fit.model->info();
-    if (fit.mirror > 0)
+    if (measured::has_mirror(fit))
       files_.note(fmt::format("{}: {} has a mirror, {} % of a white world, which is not in the data", measurement.file,
                               info.name, in_percent(fit.mirror)));
     if (fit.matte) {

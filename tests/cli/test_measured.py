@@ -117,9 +117,85 @@ def test_holes_are_filled_from_beside_them(merl_file):
     assert notes[1].startswith("50 entries are negative in one channel or two")
     i, o = hemisphere(500, 5, 0.2), hemisphere(500, 6, 0.2)
     found, _ = pairs(file, i, o)
-    # Where a cell and all beside it are missing there is nothing to tell: rare at a fifth.
     near = np.isclose(found, glossy(i, o), rtol=0.05, atol=2e-3).all(-1)
     assert near.mean() > 0.97 and (found >= 0).all()
+
+
+def at_half_angles(theta_h, theta_d, phi_d):
+    """wi and wo with these angles, in degrees, of a half vector with azimuth 0."""
+    theta_h, theta_d, phi_d = np.broadcast_arrays(theta_h, theta_d, phi_d)
+    rest = 0 * theta_h
+    view, light = half_directions(*(np.radians(a).ravel() for a in (theta_h, rest, theta_d, phi_d)))
+    return view, light
+
+
+def microfacets(wi, wo, roughness=0.3, f0=0.04):
+    """GGX over a matte base."""
+    h = unit(wi + wo)
+    masked = sum(
+        (np.sqrt(1 + roughness**2 * (1 / np.maximum(w[:, 2], 1e-4) ** 2 - 1)) - 1) / 2
+        for w in (wi, wo)
+    )
+    d = roughness**2 / (np.pi * (h[:, 2] ** 2 * (roughness**2 - 1) + 1) ** 2)
+    fresnel = f0 + (1 - f0) * (1 - np.clip((wi * h).sum(-1), 0, 1)) ** 5
+    cosines = np.maximum(wi[:, 2], 1e-4) * np.maximum(wo[:, 2], 1e-4)
+    lobe = fresnel * d / (1 + masked) / (4 * cosines)
+    return above(wi, wo) * (np.array([0.15, 0.03, 0.015]) + lobe[:, None])
+
+
+def test_gaps_of_many_cells_are_filled_whole(tmp_path):
+    """The value where the measurement ends holds beyond; a gap inside is crossed linearly. Cells
+    below the horizon are no part of it."""
+    wi, wo = merl_directions()
+    h, d, p = (a.ravel() for a in np.meshgrid(*map(np.arange, (90, 90, 180)), indexing="ij"))
+    known = (1 + d / 90)[:, None] * np.array([0.3, 0.2, 0.1])
+    file = tmp_path / "m.binary"
+
+    def read(missing, *angles):
+        f = np.where(above(wi, wo), known, -1)
+        f[missing] = -1
+        file.write_bytes(merl(f))
+        light, view = at_half_angles(*angles)
+        return pairs(file, light, view)[0] / [0.3, 0.2, 0.1]
+
+    # The middle of cell 59 is at 59.5 degrees.
+    at = np.array([59.5, 61, 70, 80, 89])
+    np.testing.assert_allclose(read(d >= 60, 0.5, at, 90.5), 1 + 59 / 90, rtol=1e-6)
+    np.testing.assert_allclose(read(d < 20, 0.5, [0.5, 10, 20.5], 30), 1 + 20 / 90, rtol=1e-6)
+    between = read((d > 20) & (d < 50), 10, [20.5, 30.5, 35.5, 50.5], 90.5)
+    np.testing.assert_allclose(between[:, 0], 1 + np.array([20, 30, 35, 50]) / 90, rtol=1e-6)
+    # Rows that lack everything, and planes.
+    for missing in (h < 20, (h < 20) & (p > 90), (p > 20) & (p < 120), (h > 30) & (p < 90)):
+        found = read(missing, [[0], [10]], [[20.5, 40.5]], 60.5)
+        np.testing.assert_allclose(found[:, 0], 1 + np.array([20, 40] * 2) / 90, rtol=1e-6)
+    (note,) = told(file)["notes"]
+    assert "not measured, filled along theta_d; where a row has nothing, along phi_d" in note
+
+
+def test_a_model_is_found_in_spite_of_a_gap(tmp_path):
+    """What was not measured is no darkness to which the model is fitted."""
+    wi, wo = merl_directions()
+    f = np.where(above(wi, wo), microfacets(wi, wo), -1)
+    h = unit(wi + wo)
+    f[(wi * h).sum(-1) < np.cos(np.radians(60))] = -1
+    file = tmp_path / "m.binary"
+    file.write_bytes(merl(f))
+    done = run("measured", file, "--json", "--models", "microfacet")
+    (fit,) = json.loads(done.stdout)["fits"]
+    assert fit["error"] < 0.02
+    assert fit["parameters"]["f0"] == pytest.approx([0.04] * 3, rel=0.03)
+    assert fit["parameters"]["ax"] == pytest.approx(0.3, rel=0.02)
+
+
+def test_gaps_of_alta_are_filled_whole(tmp_path):
+    axes = np.radians(range(0, 81, 10)), np.radians(range(0, 91, 10)), np.radians(range(0, 181, 15))
+    th, td, pd = (a.ravel() for a in np.meshgrid(*axes, indexing="ij"))
+    f = np.where(td > 1, -1, 0.3 + 0.1 * td)
+    file = tmp_path / "m.alta"
+    file.write_text(alta("RUSIN_TH_TD_PD", "INV_STERADIAN", th, td, pd, f))
+    light, view = at_half_angles(0, [50, 60, 75, 85], 90)
+    np.testing.assert_allclose(pairs(file, light, view)[0], 0.3 + 0.1 * np.radians(50), rtol=1e-6)
+    assert any("not measured, filled along theta_d" in note for note in told(file)["notes"])
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -266,6 +342,41 @@ def test_what_a_table_leaves_out_is_said(tmp_path):
     assert said.startswith("rows of one direction along the normal differ by up to 48 %")
 
 
+def test_azimuths_that_are_far_apart_are_told(tmp_path):
+    """A goniometer that measures the plane of incidence alone tells nothing of what is beside it;
+    data that don't depend on azimuth lose nothing."""
+    theta, told_of = [0, 30, 60], {}
+    for kind, bend in (("constant", 0), ("plane", 1)):
+        for azimuths in ([0, 180], [0, 60, 180], [0, 90, 180], [0, 120, 240], [0, 60, 180, 240]):
+            ti, pi, to, po = grid(theta, [0], theta, azimuths)
+            bent = np.sin(np.radians(ti)) * np.sin(np.radians(to)) * np.cos(np.radians(po))
+            f = 0.2 + 0.1 * bend * bent
+            file = tmp_path / "m.csv"
+            file.write_text(angle_table(ti, pi, to, po, f, f, f), encoding="utf-8")
+            notes = [n for n in told(file)["notes"] if "nothing was measured" in n]
+            told_of[kind, *azimuths] = notes
+    assert not any(notes for (kind, *_), notes in told_of.items() if kind == "constant")
+    start, end = "phi_o: nothing was measured from ", " degrees: linear between these"
+    assert told_of["plane", 0, 180] == [f"{start}0 to 180{end}"]
+    assert told_of["plane", 0, 60, 180] == [f"{start}60 to 180{end}"]
+    assert told_of["plane", 0, 90, 180] == []
+    assert told_of["plane", 0, 120, 240] == [
+        f"{start}0 to 120, from 120 to 240, from 240 to 360{end}"
+    ]
+    assert told_of["plane", 0, 60, 180, 240] == [f"{start}60 to 180, from 240 to 360{end}"]
+    # ALTA's azimuths of the light from the view, and those of the view about the half vector.
+    tv, tl, dp = (a.ravel() for a in np.meshgrid(*np.radians([theta, theta, [0, 60, 180]])))
+    file = tmp_path / "m.alta"
+    f = 0.2 + 0.1 * np.sin(tv) * np.cos(dp)
+    file.write_text(alta("ISOTROPIC_TV_TL_DPHI", "INV_STERADIAN", tv, tl, dp, f))
+    assert f"{start}60 to 180{end}" in told(file)["notes"]
+    file.write_text(alta("RUSIN_TH_TD_PD", "INV_STERADIAN", tv, tl, dp, 0.2 + 0 * f))
+    assert not any("nothing was measured" in note for note in told(file)["notes"])
+    f = 0.2 + 0.1 * np.sin(tl) * np.cos(2 * dp)
+    file.write_text(alta("RUSIN_TH_TD_PD", "INV_STERADIAN", tv, tl, dp, f))
+    assert f"phi_d: nothing was measured from 60 to 180{end}" in told(file)["notes"]
+
+
 def test_headers_are_read_as_programs_write_them(tmp_path):
     """Quotes, capitals, spaces, byte order mark and CR LF; other columns are named."""
     file = tmp_path / "m.csv"
@@ -298,6 +409,33 @@ def test_every_model_is_fitted_to_data_that_are_almost_black(tmp_path):
     assert done.returncode == 0, done.stderr
     fits = {fit["model"]: fit for fit in json.loads(done.stdout)["fits"]}
     assert fits["factors"]["error"] == 0 and fits["lambert"]["error"] == 0
+
+
+def test_why_a_model_stands_below_one_with_a_larger_error_is_said(tmp_path):
+    """The light of a mirror, which data do not hold, counts in the order alone; and none of less
+    than 0.005 % is worth a word."""
+    file = tmp_path / "m.csv"
+    ti, pi, to, po = grid(range(0, 86, 15), [0], range(0, 86, 15), range(0, 181, 15))
+
+    def printed(f, models):
+        file.write_text(angle_table(ti, pi, to, po, f, f, f), encoding="utf-8")
+        done = run("measured", file, "--models", models)
+        assert done.returncode == 0, done.stderr
+        lines = done.stdout.partition("misplaced")[2].splitlines()[1:]
+        rows = [re.match(r"  (\w+) +([\d.]+) %", line) for line in lines]
+        return [(row[1], float(row[2])) for row in rows if row], lines
+
+    wi, wo = vector(ti, pi), vector(to, po)
+    rows, lines = printed(2 * glossy(wi, wo, 4)[:, 2], "schlick,lambert")
+    assert [model for model, _ in rows] == ["lambert", "schlick"] and rows[0][1] > rows[1][1]
+    assert "its mirror" in lines[1]
+    assert lines[2:] == [
+        "  the order counts the light of a mirror as misplaced, which the column does not"
+    ]
+    rim = 0.05 + 0.2 * (1 - unit(wi + wo)[:, 2] ** 2)
+    rows, lines = printed(rim, "lambert,oren_nayar,coupled")
+    assert [model for model, _ in rows] == ["oren_nayar", "lambert", "coupled"]
+    assert len(lines) == 3 and "mirror" not in lines[2], lines
 
 
 def test_radians_are_named_or_refused(tmp_path):
