@@ -228,6 +228,7 @@ def _check(folder, blend, model, representation):
         )
     if bpy.data.filepath and Path(bpy.data.filepath).absolute() == blend:
         raise ValueError(say("{file} is the file that is open: choose another name", file=blend))
+    _check_replaced(blend)
     names = pack.model_names()
     if model is not None and model not in (*names, SUM):
         known = ", ".join([*names, SUM])
@@ -236,6 +237,26 @@ def _check(folder, blend, model, representation):
         )
     if model in names:
         pack.resolve(model, representation)
+
+
+def _check_replaced(blend):
+    """Raises ValueError if a file would be lost that is no library of materials."""
+    if not blend.exists():
+        return
+    try:
+        # Names alone are read.
+        with bpy.data.libraries.load(str(blend)) as (there, _):
+            scene = bool(there.scenes or there.objects)
+    except OSError as failed:
+        raise ValueError(say("{file} can't be read", more=str(failed), file=blend)) from failed
+    if scene:
+        raise ValueError(
+            say(
+                "{file} has a scene or objects, so it is no library of materials: choose another "
+                "name",
+                file=blend,
+            )
+        )
 
 
 def _catalogs_file(blend):

@@ -143,13 +143,14 @@ def test_nothing_is_left_where_it_fails(extension, module, empty, folder, tmp_pa
     api, blend = extension.api, tmp_path / "out.blend"
     cats = tmp_path / "blender_assets.cats.txt"
     cats.write_text("VERSION 1\n")
-    blend.write_bytes(b"before")
+    bpy.data.libraries.write(str(blend), {bpy.data.materials.new("before")})
+    before = blend.read_bytes()
 
     def refused(error, match, *arguments):
         with pytest.raises(error, match=match):
             api.new_measured_library(*arguments)
         assert sorted(p.name for p in tmp_path.iterdir()) == [cats.name, blend.name]
-        assert blend.read_bytes() == b"before" and cats.read_text() == "VERSION 1\n"
+        assert blend.read_bytes() == before and cats.read_text() == "VERSION 1\n"
 
     refused(ValueError, "There is no folder", folder / "none", blend)
     refused(ValueError, "the name of a .blend in a folder that exists", folder, tmp_path / "x.png")
@@ -186,6 +187,26 @@ def test_nothing_is_left_where_it_fails(extension, module, empty, folder, tmp_pa
     job.cancel()
     monkeypatch.setenv("BRDFC_TOOL", "/nowhere/brdfc")
     refused(api.MeasuredError, "is not the program brdfc", folder, blend)
+
+
+def test_a_file_that_is_no_library_is_not_replaced(extension, empty, folder, tmp_path):
+    blend = tmp_path / "room.blend"
+    mesh = bpy.data.objects.new("chair", bpy.data.meshes.new("chair"))
+    bpy.data.libraries.write(str(blend), {mesh})
+    for content, why in (
+        (blend.read_bytes(), "room.blend has a scene or objects, so it is no library"),
+        (b"broken", "room.blend can't be read"),
+    ):
+        blend.write_bytes(content)
+        counts = helpers.counts()
+        with pytest.raises(ValueError, match=why):
+            extension.api.new_measured_library(folder, blend, "lambert")
+        assert blend.read_bytes() == content and helpers.counts() == counts
+        assert [p.name for p in tmp_path.iterdir()] == [blend.name]
+    # One that was saved, which has a scene.
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend), copy=True)
+    with pytest.raises(ValueError, match="has a scene or objects"):
+        extension.api.start_measured_library(folder, blend, "lambert")
 
 
 def test_a_folder_of_which_no_file_can_be_read(extension, empty, tmp_path):
