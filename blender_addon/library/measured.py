@@ -66,7 +66,7 @@ class Making(Job):
         self._files = sorted(
             path
             for path in self._root.rglob("*")
-            if path.suffix.lower() in ENDINGS and path.is_file()
+            if path.suffix.lower() in ENDINGS and path.is_file() and not self._hidden(path)
         )
         if not self._files:
             endings = ", ".join(ENDINGS)
@@ -75,6 +75,9 @@ class Making(Job):
             )
         find(MeasuredError)
         self._found, self._refusals, self._fitting, self._building = {}, {}, None, None
+
+    def _hidden(self, path):
+        return any(part.startswith(".") for part in path.relative_to(self._root).parts)
 
     def step(self):
         if self.result is not None:

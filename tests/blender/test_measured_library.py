@@ -45,6 +45,8 @@ def folder(tmp_path_factory):
     write(root / "paper" / "red.csv", 0.6, 0.1, 0.1)
     (root / "broken.binary").write_bytes(b"x" * 100)
     (root / "notes.txt").write_text("not measured")
+    write(root / ".trash" / "old.csv", 0.1, 0.1, 0.8)
+    (root / "paper" / "._white.csv").write_bytes(b"what macOS writes beside files")
     return root
 
 
