@@ -39,6 +39,8 @@ from . import (
 MEASURED = "Measured"
 #: The part of the time that fits take; making materials takes the rest.
 _FITS = 0.9
+#: Most characters of an asset's description: some lines of a tooltip.
+_DESCRIPTION = 400
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,9 @@ class MeasuredLibrary:
     materials: dict
     #: A sentence for each file of which no material was made, by file.
     refusals: dict
+    #: What was assumed or repaired of a file, and what its data lack, by file: those of
+    #: Measured.notes. Files of which there is nothing to say are left out.
+    notes: dict
 
 
 class Making(Job):
@@ -128,7 +133,8 @@ class Making(Job):
             self._building.clean_up()
         names = self._names()
         made = {path: names[path] for path in self._found if path not in self._refusals}
-        self.result = MeasuredLibrary(self._blend, self._catalogs, made, self._refusals)
+        notes = {path: self._found[path].notes for path in made if self._found[path].notes}
+        self.result = MeasuredLibrary(self._blend, self._catalogs, made, self._refusals, notes)
         return None
 
     def _nothing(self):
@@ -166,7 +172,7 @@ class Making(Job):
                 "model": self._model,
                 "representation": self._representation,
                 "catalog_id": ids[catalogs[path]],
-                "description": f"{found.path.name}: {found.format}, {found.grid}",
+                "description": _description(found),
                 "tags": [MEASURED.lower(), found.format],
             }
             for path, found in self._found.items()
@@ -180,6 +186,17 @@ class Making(Job):
         for job in (self._fitting, self._building):
             if job is not None:
                 job.cancel()
+
+
+def _description(found):
+    """Of an asset. What the data lack stands before what was assumed of them, as far as there is
+    room."""
+    said = f"{found.path.name}: {found.format}, {found.grid}"
+    for note in (*found.told["lacks"], *found.told["notes"]):
+        longer = f"{said}; {note}"
+        if len(longer) <= _DESCRIPTION:
+            said = longer
+    return said
 
 
 class _Building(ProgramJob):

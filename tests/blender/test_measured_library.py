@@ -3,6 +3,7 @@
 
 import itertools
 import os
+import re
 import sys
 import uuid
 from importlib import import_module
@@ -93,6 +94,9 @@ def test_a_folder_becomes_a_catalogue(extension, empty, folder, tmp_path):
     }
     assert [path.name for path in made.refusals] == ["broken.binary"]
     assert "header: expected 90 x 90 x 180" in made.refusals[folder / "broken.binary"]
+    assert made.notes.keys() == made.materials.keys()
+    for notes in made.notes.values():
+        assert notes[0].startswith("phi_o lies within half a circle") and len(notes) == 2
     assert blend.read_bytes()[:4] == b"\x28\xb5\x2f\xfd", "compressed"
     assert sorted(p.name for p in tmp_path.iterdir()) == [cats.name, blend.name]
     # Nothing of what was there is lost, and a catalogue that exists is used.
@@ -106,7 +110,9 @@ def test_a_folder_becomes_a_catalogue(extension, empty, folder, tmp_path):
         data, (node,) = material.asset_data, extension.nodes.group_nodes(material)
         below = "/paper" if name in ("white", "paper/red.csv") else ""
         assert data.catalog_id == known[f"brdfc/Measured{below}"]
-        assert "CSV" in data.description and {t.name for t in data.tags} == {"measured", "CSV"}
+        assert re.search(r"CSV, .* of view; nothing was measured beyond 85 deg", data.description)
+        assert "; phi_o lies within half a circle" in data.description
+        assert {t.name for t in data.tags} == {"measured", "CSV"}
         assert extension.nodes.identity(node)[0] == "lambert"
     red, white = color(materials["red.csv"]), color(materials["white"])
     assert red[0] > 2 * red[1] and white[2] > 2 * red[2] and np.ptp(white) < 0.1
@@ -209,6 +215,12 @@ def test_a_file_that_is_no_library_is_not_replaced(extension, empty, folder, tmp
     bpy.ops.wm.save_as_mainfile(filepath=str(blend), copy=True)
     with pytest.raises(ValueError, match="has a scene or objects"):
         extension.api.start_measured_library(folder, blend, "lambert")
+
+
+def test_what_an_asset_is_described_by_is_short(module, tmp_path):
+    told = {"lacks": ["a" * 100, "b" * 300], "notes": ["c" * 100, "d" * 200]}
+    found = SimpleNamespace(path=tmp_path / "x.csv", format="CSV", grid="2 x 2", told=told)
+    assert module._description(found) == f"x.csv: CSV, 2 x 2; {'a' * 100}; {'c' * 100}"
 
 
 def test_a_folder_of_which_no_file_can_be_read(extension, empty, tmp_path):
