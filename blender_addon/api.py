@@ -189,14 +189,15 @@ def new_measured_library(folder, blend, model=None, representation="auto"):
     """Writes a .blend with a material for each measured file in a folder and its subfolders, as
     assets of the catalogue brdfc/Measured, or one for each subfolder below it, with previews.
 
-    `model` and `representation` are those of new_measured_material(). A .blend of that name is
-    replaced; the file of catalogues beside it, or of the asset library that contains it, keeps what
-    it has. The open file is left alone. Takes some ten seconds a file.
+    `model` and `representation` are those of new_measured_material(). A library of that name is
+    replaced, and a .blend with a scene or objects refused; the file of catalogues beside it, or of
+    the asset library that contains it, keeps what it has. The open file is left alone. Files and
+    folders whose names begin with a dot are left out. Takes some ten seconds a file.
 
-    Returns a MeasuredLibrary: `blend`, `catalogs`, and by file the names of its `materials` and
-    `refusals`, a sentence for each file of which no material was made. Raises ValueError for
-    arguments that are wrong, and MeasuredError without the program or without any material; no file
-    is changed then.
+    Returns a MeasuredLibrary: `blend`, `catalogs`, and by file the names of its `materials`,
+    `refusals`, a sentence for each file of which no material was made, and `notes`, what the data
+    lack. Raises ValueError for arguments that are wrong, and MeasuredError without the program or
+    without any material; no file is changed then.
     """
     job = start_measured_library(folder, blend, model, representation)
     try:

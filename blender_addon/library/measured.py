@@ -39,6 +39,8 @@ from . import (
 MEASURED = "Measured"
 #: The part of the time that fits take; making materials takes the rest.
 _FITS = 0.9
+#: Most characters of an asset's description: some lines of a tooltip.
+_DESCRIPTION = 400
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,9 @@ class MeasuredLibrary:
     materials: dict
     #: A sentence for each file of which no material was made, by file.
     refusals: dict
+    #: What was assumed or repaired of a file, and what its data lack, by file: those of
+    #: Measured.notes. Files of which there is nothing to say are left out.
+    notes: dict
 
 
 class Making(Job):
@@ -66,7 +71,7 @@ class Making(Job):
         self._files = sorted(
             path
             for path in self._root.rglob("*")
-            if path.suffix.lower() in ENDINGS and path.is_file()
+            if path.suffix.lower() in ENDINGS and path.is_file() and not self._hidden(path)
         )
         if not self._files:
             endings = ", ".join(ENDINGS)
@@ -75,6 +80,9 @@ class Making(Job):
             )
         find(MeasuredError)
         self._found, self._refusals, self._fitting, self._building = {}, {}, None, None
+
+    def _hidden(self, path):
+        return any(part.startswith(".") for part in path.relative_to(self._root).parts)
 
     def step(self):
         if self.result is not None:
@@ -125,7 +133,8 @@ class Making(Job):
             self._building.clean_up()
         names = self._names()
         made = {path: names[path] for path in self._found if path not in self._refusals}
-        self.result = MeasuredLibrary(self._blend, self._catalogs, made, self._refusals)
+        notes = {path: self._found[path].notes for path in made if self._found[path].notes}
+        self.result = MeasuredLibrary(self._blend, self._catalogs, made, self._refusals, notes)
         return None
 
     def _nothing(self):
@@ -163,7 +172,7 @@ class Making(Job):
                 "model": self._model,
                 "representation": self._representation,
                 "catalog_id": ids[catalogs[path]],
-                "description": f"{found.path.name}: {found.format}, {found.grid}",
+                "description": _description(found),
                 "tags": [MEASURED.lower(), found.format],
             }
             for path, found in self._found.items()
@@ -177,6 +186,17 @@ class Making(Job):
         for job in (self._fitting, self._building):
             if job is not None:
                 job.cancel()
+
+
+def _description(found):
+    """Of an asset. What the data lack stands before what was assumed of them, as far as there is
+    room."""
+    said = f"{found.path.name}: {found.format}, {found.grid}"
+    for note in (*found.told["lacks"], *found.told["notes"]):
+        longer = f"{said}; {note}"
+        if len(longer) <= _DESCRIPTION:
+            said = longer
+    return said
 
 
 class _Building(ProgramJob):
@@ -228,6 +248,7 @@ def _check(folder, blend, model, representation):
         )
     if bpy.data.filepath and Path(bpy.data.filepath).absolute() == blend:
         raise ValueError(say("{file} is the file that is open: choose another name", file=blend))
+    _check_replaced(blend)
     names = pack.model_names()
     if model is not None and model not in (*names, SUM):
         known = ", ".join([*names, SUM])
@@ -236,6 +257,26 @@ def _check(folder, blend, model, representation):
         )
     if model in names:
         pack.resolve(model, representation)
+
+
+def _check_replaced(blend):
+    """Raises ValueError if a file would be lost that is no library of materials."""
+    if not blend.exists():
+        return
+    try:
+        # Names alone are read.
+        with bpy.data.libraries.load(str(blend)) as (there, _):
+            scene = bool(there.scenes or there.objects)
+    except OSError as failed:
+        raise ValueError(say("{file} can't be read", more=str(failed), file=blend)) from failed
+    if scene:
+        raise ValueError(
+            say(
+                "{file} has a scene or objects, so it is no library of materials: choose another "
+                "name",
+                file=blend,
+            )
+        )
 
 
 def _catalogs_file(blend):

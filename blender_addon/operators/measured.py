@@ -119,6 +119,13 @@ class BRDFC_OT_new_measured_library(ModalJob, Operator):
         for path, why in made.refusals.items():
             said = say("{file}: {reason}", file=path.name, reason=why)
             self.report({"WARNING"}, rpt(said))
+        if made.notes:
+            said = say(
+                "Files with notes on what their data lack, which the descriptions of their assets "
+                "have: {count}",
+                count=len(made.notes),
+            )
+            self.report({"INFO"}, rpt(said))
         said = say(
             "{file} has {count} materials: name its folder in Preferences > File Paths > Asset "
             "Libraries to see them in the Asset Browser",

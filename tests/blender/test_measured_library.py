@@ -3,6 +3,7 @@
 
 import itertools
 import os
+import re
 import sys
 import uuid
 from importlib import import_module
@@ -45,6 +46,8 @@ def folder(tmp_path_factory):
     write(root / "paper" / "red.csv", 0.6, 0.1, 0.1)
     (root / "broken.binary").write_bytes(b"x" * 100)
     (root / "notes.txt").write_text("not measured")
+    write(root / ".trash" / "old.csv", 0.1, 0.1, 0.8)
+    (root / "paper" / "._white.csv").write_bytes(b"what macOS writes beside files")
     return root
 
 
@@ -91,6 +94,9 @@ def test_a_folder_becomes_a_catalogue(extension, empty, folder, tmp_path):
     }
     assert [path.name for path in made.refusals] == ["broken.binary"]
     assert "header: expected 90 x 90 x 180" in made.refusals[folder / "broken.binary"]
+    assert made.notes.keys() == made.materials.keys()
+    for notes in made.notes.values():
+        assert notes[0].startswith("phi_o lies within half a circle") and len(notes) == 2
     assert blend.read_bytes()[:4] == b"\x28\xb5\x2f\xfd", "compressed"
     assert sorted(p.name for p in tmp_path.iterdir()) == [cats.name, blend.name]
     # Nothing of what was there is lost, and a catalogue that exists is used.
@@ -104,7 +110,9 @@ def test_a_folder_becomes_a_catalogue(extension, empty, folder, tmp_path):
         data, (node,) = material.asset_data, extension.nodes.group_nodes(material)
         below = "/paper" if name in ("white", "paper/red.csv") else ""
         assert data.catalog_id == known[f"brdfc/Measured{below}"]
-        assert "CSV" in data.description and {t.name for t in data.tags} == {"measured", "CSV"}
+        assert re.search(r"CSV, .* of view; nothing was measured beyond 85 deg", data.description)
+        assert "; phi_o lies within half a circle" in data.description
+        assert {t.name for t in data.tags} == {"measured", "CSV"}
         assert extension.nodes.identity(node)[0] == "lambert"
     red, white = color(materials["red.csv"]), color(materials["white"])
     assert red[0] > 2 * red[1] and white[2] > 2 * red[2] and np.ptp(white) < 0.1
@@ -143,13 +151,14 @@ def test_nothing_is_left_where_it_fails(extension, module, empty, folder, tmp_pa
     api, blend = extension.api, tmp_path / "out.blend"
     cats = tmp_path / "blender_assets.cats.txt"
     cats.write_text("VERSION 1\n")
-    blend.write_bytes(b"before")
+    bpy.data.libraries.write(str(blend), {bpy.data.materials.new("before")})
+    before = blend.read_bytes()
 
     def refused(error, match, *arguments):
         with pytest.raises(error, match=match):
             api.new_measured_library(*arguments)
         assert sorted(p.name for p in tmp_path.iterdir()) == [cats.name, blend.name]
-        assert blend.read_bytes() == b"before" and cats.read_text() == "VERSION 1\n"
+        assert blend.read_bytes() == before and cats.read_text() == "VERSION 1\n"
 
     refused(ValueError, "There is no folder", folder / "none", blend)
     refused(ValueError, "the name of a .blend in a folder that exists", folder, tmp_path / "x.png")
@@ -186,6 +195,32 @@ def test_nothing_is_left_where_it_fails(extension, module, empty, folder, tmp_pa
     job.cancel()
     monkeypatch.setenv("BRDFC_TOOL", "/nowhere/brdfc")
     refused(api.MeasuredError, "is not the program brdfc", folder, blend)
+
+
+def test_a_file_that_is_no_library_is_not_replaced(extension, empty, folder, tmp_path):
+    blend = tmp_path / "room.blend"
+    mesh = bpy.data.objects.new("chair", bpy.data.meshes.new("chair"))
+    bpy.data.libraries.write(str(blend), {mesh})
+    for content, why in (
+        (blend.read_bytes(), "room.blend has a scene or objects, so it is no library"),
+        (b"broken", "room.blend can't be read"),
+    ):
+        blend.write_bytes(content)
+        counts = helpers.counts()
+        with pytest.raises(ValueError, match=why):
+            extension.api.new_measured_library(folder, blend, "lambert")
+        assert blend.read_bytes() == content and helpers.counts() == counts
+        assert [p.name for p in tmp_path.iterdir()] == [blend.name]
+    # One that was saved, which has a scene.
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend), copy=True)
+    with pytest.raises(ValueError, match="has a scene or objects"):
+        extension.api.start_measured_library(folder, blend, "lambert")
+
+
+def test_what_an_asset_is_described_by_is_short(module, tmp_path):
+    told = {"lacks": ["a" * 100, "b" * 300], "notes": ["c" * 100, "d" * 200]}
+    found = SimpleNamespace(path=tmp_path / "x.csv", format="CSV", grid="2 x 2", told=told)
+    assert module._description(found) == f"x.csv: CSV, 2 x 2; {'a' * 100}; {'c' * 100}"
 
 
 def test_a_folder_of_which_no_file_can_be_read(extension, empty, tmp_path):
