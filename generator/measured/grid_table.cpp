@@ -9,7 +9,6 @@
 namespace brdfc::measured {
 namespace {
 
-
 double theta_of(const Vec3<double>& w) { return kDegrees * std::atan2(std::sqrt(sin2_theta(w)), w.z); }
 double phi_of(const Vec3<double>& w) { return kDegrees * std::atan2(w.y, w.x); }
 
