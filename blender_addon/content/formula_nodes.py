@@ -136,13 +136,10 @@ _AXES = [
     ["half_along", "FLOAT"],
     ["strip", "VECTOR"],
 ]
+#: Directions to the parts of a lamp.
+_PARTS = [[f"part {i}", "VECTOR"] for i in range(slots.MOST_PARTS)]
 #: Larger than the angle between any two directions.
 _FAR = 4.0
-
-
-def _parts(most_parts):
-    """Directions to the parts of a lamp."""
-    return [[f"part {i}", "VECTOR"] for i in range(most_parts)]
 
 
 def _decoded(w, shape):
@@ -157,7 +154,7 @@ def _decoded(w, shape):
     }
 
 
-def _seen_group(parts, most_parts):
+def _seen_group(parts):
     """The group that computes the cones of directions towards a slot's lamp and its parts."""
     vectors = (*_SLOT, "at", "view", "normal")
 
@@ -167,14 +164,19 @@ def _seen_group(parts, most_parts):
         known |= here.add("axes", **known)
         known |= here.add("cone", **known)
         clear = 0.0
-        for i, (name, _) in enumerate(_parts(most_parts)):
+        for i, (name, _) in enumerate(_PARTS):
             part = here.add("part", **known, index=float(i))
             known[name] = part["part"]
             clear = w.math("ADD", clear, part["clear"])
         return {name: (known | {"clear": clear})[name] for name, _ in outputs}
 
-    outputs = _SEEN + _CODED + _AXES + _parts(most_parts)
-    content = ["seen", slots.CODE, [parts.data[name] for name in ("axes", "cone", "part")]]
+    outputs = _SEEN + _CODED + _AXES + _PARTS
+    content = [
+        "seen",
+        slots.CODE,
+        slots.MOST_PARTS,
+        [parts.data[name] for name in ("axes", "cone", "part")],
+    ]
     inputs = [[name, "VECTOR"] for name in vectors]
     return make_group("lamp seen", content, inputs, outputs, fill)
 
@@ -189,7 +191,7 @@ def _point_of(w, towards, drop, anywhere, u):
     return w.vector("ADD", w.scaled(towards, cosine), w.scaled(beside, sine))
 
 
-def _lamp_group(parts, most_parts):
+def _lamp_group(parts):
     """The group that makes a lamp's closures, a cone for each of its parts, which carry the model's
     value at one of its points, or the part of it that random directions leave. Cycles skips its
     computations where the factor `lit` is 0."""
@@ -197,7 +199,7 @@ def _lamp_group(parts, most_parts):
     of_cone = ("chord", "flat", "room", "solid_angle", "clear", "parts")
     numbers = (*of_cone, "drop", "lit", "u_0", "u_1", "u_2")
     inputs = [[name, "VECTOR"] for name in vectors] + [[name, "FLOAT"] for name in numbers]
-    inputs += [["kind", "FLOAT"], *_AXES, *_parts(most_parts)]
+    inputs += [["kind", "FLOAT"], *_AXES, *_PARTS]
     inputs += [[name, kind] for name, kind in parts.inputs("value").items() if name != "wi"]
     known = {name for name, _ in inputs}
     inputs += [[name, "FLOAT"] for name in svm_constants.VALUES if name not in known]
@@ -213,14 +215,14 @@ def _lamp_group(parts, most_parts):
         cone |= {"emphasis": on_flat["emphasis"], "u_2": found["u_2"]}
         lobe = here.add("lobe", **at_point, **cone)
         cones = []
-        for i, (name, _) in enumerate(_parts(most_parts)):
+        for i, (name, _) in enumerate(_PARTS):
             toon = w.toon(lobe["color"], lobe["size"], w.half(found[name], found["view"]))
             exists = w.math("GREATER_THAN", found["parts"], i + 0.5)
             cones.append(w.shown(exists, toon) if i > 0 else toon)
         return {"BSDF": w.shown(found["lit"], w.sum(cones))}
 
     used = ("value", "flat", "lobe")
-    content = ["lamp", {name: parts.data[name] for name in used}]
+    content = ["lamp", slots.MOST_PARTS, {name: parts.data[name] for name in used}]
     return make_group(f"{parts.title}: lamp", content, inputs, [["BSDF", "SHADER"]], fill)
 
 
@@ -341,8 +343,7 @@ def _wired(w, data, normal, tangent, parameters, of_slots, title):
         frame = zip(("tangent", "bitangent", "normal"), surface.axes, strict=True)
         here = {"at": surface.place, "view": surface.view, **dict(frame)}
         given |= here | constants
-        most_parts = data["parts_of_lamp"]
-        seen, lit = _seen_group(parts, most_parts), _lamp_group(parts, most_parts)
+        seen, lit = _seen_group(parts), _lamp_group(parts)
         for slot in of_slots:
             values = dict(zip(_SLOT, slot, strict=True))
             lamps.append(values | add_group(w, seen, here | values, "lamp seen"))

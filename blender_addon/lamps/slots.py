@@ -21,7 +21,7 @@ EMPTY, BALL, SUN, RECTANGLE, ELLIPSE, SKY_SUN = range(6)
 #: parts less one, and by CODE squared times the number of its plane, if there are others in that
 #: plane. Formula Nodes read both (content/formula_nodes.py), other shaders skip them.
 CODE = 8.0
-#: Most parts of a rectangle; kMostParts in generator/forms/node_lamps.h.
+#: Most parts of a rectangle. Formula Nodes have a closure for each.
 MOST_PARTS = 4
 #: Index of that number in a slot.
 _SHAPE = 9

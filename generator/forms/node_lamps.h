@@ -33,8 +33,6 @@ template <class T> struct LampSlot {
   T kind;
   T parts;  ///< number of parts of a rectangle, along its longer side
 };
-/// Maximum number of parts; also in blender_addon/lamps/slots.py.
-inline constexpr int kMostParts = 4;
 
 /// The orientation and size of a lamp, from its slot. It does not depend on the shading point, so Cycles computes it
 /// once.

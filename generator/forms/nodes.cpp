@@ -287,7 +287,8 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
   out.lamp_bytes = out.lamps > 0 ? pool_bytes(ClosureKind::GlossyToon) + kPoolNode : 0;
   out.source = Json{{"format", 5},           {"isotropic", model.info().properties.isotropic},
                     {"narrow", kNarrow},     {"widest", kWidestWidened},
-                    {"lamps", out.lamps},    {"parts_of_lamp", kMostParts},
+                    {"lamps", out.lamps},
+
                     {"bounds", bounds},      {"closures", first.closures},
                     {"base", first.of_base}, {"parts", parts}}
                    .dump() +
