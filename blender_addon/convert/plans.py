@@ -216,19 +216,19 @@ def _plan_node(material, node):
     single = None
     if not inputs.follows("Metallic"):
         part, fit = near()
-        single = functools.partial(plan, part, [fit], [error for _, error in fit.found], **more)
-        if given["metallic"] in (0, 1):
-            return single()
-        if fit.lost and inputs.follows(color):
-            single = None
+        is_pure = given["metallic"] in (0, 1)
+        if is_pure or not (fit.lost and inputs.follows(color)):
+            single = plan(part, [fit], [error for _, error in fit.found], **more)
+        if is_pure:
+            return single
     (part, plain), (metal, fit) = near(metallic=0.0), near(metallic=1.0)
     if (share := inputs.mean("Metallic")) is None:
         errors = [error for _, error in (*plain.found, *fit.found)]
     else:
         share = min(max(share, 0.0), 1.0)
         errors = [_mixed(share, *both) for both in zip(plain.found, fit.found, strict=True)]
-    mixed = functools.partial(plan, part, [plain, fit], errors, metal=metal, **more)
-    return mixed() if single is None or mixed().error < single().error else single()
+    mixed = plan(part, [plain, fit], errors, metal=metal, **more)
+    return mixed if single is None or mixed.error < single.error else single
 
 
 def _mixed(share, plain, metal):

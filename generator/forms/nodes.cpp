@@ -285,12 +285,15 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
   out.slots = out.closures - out.lamps + out.lamps * slots(ClosureKind::PhongRamp);
   out.closure_bytes = (out.closures - out.lamps) * (pool_bytes(ClosureKind::Ggx) + kPoolNode);
   out.lamp_bytes = out.lamps > 0 ? pool_bytes(ClosureKind::GlossyToon) + kPoolNode : 0;
-  out.source = Json{{"format", 5},           {"isotropic", model.info().properties.isotropic},
-                    {"narrow", kNarrow},     {"widest", kWidestWidened},
+  out.source = Json{{"format", 5},
+                    {"isotropic", model.info().properties.isotropic},
+                    {"narrow", kNarrow},
+                    {"widest", kWidestWidened},
                     {"lamps", out.lamps},
-
-                    {"bounds", bounds},      {"closures", first.closures},
-                    {"base", first.of_base}, {"parts", parts}}
+                    {"bounds", bounds},
+                    {"closures", first.closures},
+                    {"base", first.of_base},
+                    {"parts", parts}}
                    .dump() +
                "\n";
   return out;

@@ -13,6 +13,8 @@ import helpers
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.usefixtures("by_the_tool")
+
 
 def direction(theta, phi):
     theta, phi = np.radians(theta), np.radians(phi)
@@ -51,13 +53,6 @@ def write_table(extension, tmp_path_factory):
 @pytest.fixture(scope="module")
 def paint(write_table):
     return write_table("paint.csv", "ward", ks=(0.2, 0.1, 0.05), ax=0.25, ay=0.25)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def by_the_tool(program):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("BRDFC_TOOL", str(program))
-        yield
 
 
 @pytest.fixture(scope="module")

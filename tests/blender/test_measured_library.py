@@ -14,12 +14,7 @@ import helpers
 import numpy as np
 import pytest
 
-
-@pytest.fixture(scope="module", autouse=True)
-def by_the_tool(program):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("BRDFC_TOOL", str(program))
-        yield
+pytestmark = pytest.mark.usefixtures("by_the_tool")
 
 
 @pytest.fixture(scope="module")

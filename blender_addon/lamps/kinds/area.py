@@ -33,26 +33,26 @@ class Area(Light):
         return slots.numbers(spread, *placed, sizes)
 
     def sheet(self, item, light, matrix):
+        if self.is_distorted(matrix):
+            return None
         axes = np.array([column.normalized() for column in matrix.to_3x3().transposed()])
-        scaled = (
+        centre, stays = np.array(matrix.translation), item is None or keeps_its_place(item)
+        return slots.Sheet(centre, axes, self._scaled(light, matrix), not _is_round(light), stays)
+
+    def _scaled(self, light, matrix):
+        """Its two sizes in world space."""
+        return tuple(
             getattr(light, side) * abs(scale)
             for side, scale in zip(self.sizes(light), matrix.to_scale(), strict=False)
         )
-        centre, stays = np.array(matrix.translation), item is None or keeps_its_place(item)
-        if slots.is_sheared(matrix):
-            return None
-        return slots.Sheet(centre, axes, tuple(scaled), not _is_round(light), stays)
 
     def irradiance(self, light, matrix, power, points):
         squared, along = seen_from(points, matrix)
         return power / math.pi / squared * np.maximum(along, ASIDE)
 
     def angular_size(self, light, matrix):
-        scaled = (
-            getattr(light, side) * scale
-            for side, scale in zip(self.sizes(light), matrix.to_scale(), strict=False)
-        )
-        return slots.angular_size_at(matrix.translation, math.hypot(*scaled) / 2)
+        radius = math.hypot(*self._scaled(light, matrix)) / 2
+        return slots.angular_size_at(matrix.translation, radius)
 
     def is_sizeless(self, light):
         return False

@@ -293,7 +293,6 @@ def _sheet(name, radiance, kind, middle, frame, sizes):
         return radiance * area * np.abs(to @ frame[2]) / squared**1.5
 
     angular_size = slots.angular_size_at(middle, math.hypot(*sizes) / 2)
-    rectangle = kind == slots.RECTANGLE
     candidate = slots.Candidate(name, (), irradiance, angular_size)
 
     def judge(points):
@@ -304,8 +303,9 @@ def _sheet(name, radiance, kind, middle, frame, sizes):
         candidate.values = slots.numbers(
             kind, tuple(middle), (turn.x, turn.y, turn.z), (1, 1, turn.w), sizes
         )
-        frame_here = np.array(axes.transposed())
-        candidate.sheet = slots.Sheet(middle, frame_here, tuple(sizes), rectangle, True)
+        candidate.sheet = slots.Sheet(
+            middle, np.array(axes.transposed()), tuple(sizes), kind == slots.RECTANGLE, stays=True
+        )
 
     candidate.judge = judge
     return candidate
