@@ -54,8 +54,8 @@ std::optional<ClosureSum<Expr>> native_closures(const Model& model, const Brdf<E
 }
 
 /// Closures that are nowhere brighter than the model. Choices must be bound. The sockets of the closures are outputs of
-/// the program. The program reads `stands`, which is 0 where normals are bent and Cycles would darken the closures, and
-/// `camera`, which is 1 for camera rays: for other rays, Filter Glossy increases the roughness of microfacets. The
+/// the program. The program reads `stands`, which is 0 where normals are bent and Cycles would darken matte closures,
+/// and `camera`, which is 1 for camera rays: for other rays, Filter Glossy increases the roughness of microfacets. The
 /// returned closures have these outputs as inputs, for use in other programs.
 ClosureSum<Expr> record_base(const Model& model, const ParamValues& fixed, const Brdf<Expr>& brdf, Program& program,
                              Json& closures) {
@@ -64,10 +64,10 @@ ClosureSum<Expr> record_base(const Model& model, const ParamValues& fixed, const
   ClosureSum<Expr> sum = of->record(model.info(), fixed, input3("wo"));
   for (std::size_t i = 0; i < sum.size(); ++i) {
     Closure<Expr>& c = sum[i];
-    c.weight = c.weight * Expr::input("stands");
+    // Facets are not matte, so bent normals do not darken them.
+    c.weight = c.weight * Expr::input(has_facets(c.kind) ? "camera" : "stands");
     Json closure = {{"kind", kind_of(c.kind)}, {"weight", fmt::format("weight_{}", i)}};
     if (has_facets(c.kind)) {
-      c.weight = c.weight * Expr::input("camera");
       closure["roughness"] = fmt::format("roughness_{}", i);
       program.output(closure["roughness"], sqrt(c.alpha));
     }
@@ -274,7 +274,7 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
   if (lamps) {
     add("axes", record_axes());
     add("cone", record_cone());
-    add("part", record_part());
+    add("cone_at", record_cone_at());
     add("flat", record_flat());
     add("met", record_met());
     add("lobe", record_lobe());

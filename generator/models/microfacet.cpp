@@ -38,6 +38,7 @@
 // d'Eon: Importance Sampling Microfacet-Based BSDFs using the Distribution of Visible Normals, EGSR 2014). Smith's
 // beckmann takes these as well: its own need the inverse of an error function.
 #include "model/base_terms.h"
+#include "model/under.h"
 #include "model/v_cavity.h"
 
 namespace brdfc {
@@ -219,8 +220,18 @@ template <class T> struct Microfacet {
     return {facets(ClosureKind::Ggx, is_beckmann() ? none : weight, ax, ay, T(0)),
             facets(ClosureKind::Beckmann, is_beckmann() ? weight : none, ax, ay, T(0))};
   }
+
+  /// Cycles' closure of ggx, if the masking is its own and both roughnesses are equal, with the least F: S is at least
+  /// f0, and q at most 1.
+  ClosureSum<T> under(const Vec3<T>& wo) const {
+    const bool is_of_cycles = !is_beckmann() && has_masking(SmithCorrelated);
+    const Rgb<T> least = f0 * tint * compensation(wo), none(T(0));
+    const Rgb<T> weight = select(ax < ay || ay < ax, none, least);
+    return {facets(ClosureKind::Ggx, is_of_cycles ? weight : none, ax)};
+  }
 };
 
 BRDFC_MODEL(Microfacet)
+BRDFC_UNDER(Microfacet)
 
 }  // namespace brdfc

@@ -57,6 +57,8 @@ struct UnderRow {
 const UnderRow kUnderRows[] = {{"ashikhmin_shirley", {"rs=0,0,0"}, 0.9},
                                {"ashikhmin_shirley", {"part=diffuse"}, 0.95},
                                {"coupled", {}, 0.94},
+                               {"microfacet", {}, 0.9},
+                               {"microfacet", {"distribution=multiscatter_ggx", "ax=0.6", "ay=0.6"}, 0.9},
                                {"oren_nayar", {}, 0.75},
                                {"oren_nayar", {"form=qualitative"}, 0.9},
                                {"phong_material", {"ks=0", "kr=0"}, 0.999},
