@@ -338,7 +338,7 @@ def _wired(w, data, normal, tangent, parameters, of_slots, title):
         bent = w.vector("DISTANCE", surface.normal, surface.interpolated, output="Value")
         given |= {"stands": w.math("LESS_THAN", bent, 1e-4), "camera": surface.camera}
         given |= parts.add("base", **given)
-        shaders += [_of_base(w, closure, given, surface.normal) for closure in data["base"]]
+        shaders += [_of_base(w, closure, given, surface) for closure in data["base"]]
     lamps = []
     # All closures of a shading point are sampled with the same numbers: they are added up, so they
     # need not be independent.
@@ -360,12 +360,14 @@ def _wired(w, data, normal, tangent, parameters, of_slots, title):
     return {"BSDF": w.sum(shaders)}
 
 
-def _of_base(w, closure, given, normal):
+def _of_base(w, closure, given, surface):
     """A closure of the base."""
     found = {name: given[of] for name, of in closure.items() if name != "kind"}
     if closure["kind"] == "cone":
-        return w.toon(found["weight"], found["size"], normal, found["smooth"], "DIFFUSE")
-    return w.bsdf(closure["kind"], found["weight"], normal, found.get("roughness", 0.0))
+        return w.toon(found["weight"], found["size"], surface.normal, found["smooth"], "DIFFUSE")
+    stretched = (found["anisotropy"], surface.tangent) if "anisotropy" in found else None
+    roughness = found.get("roughness", 0.0)
+    return w.bsdf(closure["kind"], found["weight"], surface.normal, roughness, stretched)
 
 
 def _rest(w, parts, surface, given, lamps, narrow):

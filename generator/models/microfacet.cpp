@@ -221,13 +221,12 @@ template <class T> struct Microfacet {
             facets(ClosureKind::Beckmann, is_beckmann() ? weight : none, ax, ay, T(0))};
   }
 
-  /// Cycles' closure of ggx, if the masking is its own and both roughnesses are equal, with the least F: S is at least
-  /// f0, and q at most 1.
+  /// Cycles' closures, if the masking is theirs, with the least F: S is at least f0, and q at most 1.
   ClosureSum<T> under(const Vec3<T>& wo) const {
-    const bool is_of_cycles = !is_beckmann() && has_masking(SmithCorrelated);
     const Rgb<T> least = f0 * tint * compensation(wo), none(T(0));
-    const Rgb<T> weight = select(ax < ay || ay < ax, none, least);
-    return {facets(ClosureKind::Ggx, is_of_cycles ? weight : none, ax)};
+    const auto weight = [&](bool is_this) { return is_this && has_masking(SmithCorrelated) ? least : none; };
+    return {facets(ClosureKind::Ggx, weight(!is_beckmann()), ax, ay, T(0)),
+            facets(ClosureKind::Beckmann, weight(is_beckmann()), ax, ay, T(0))};
   }
 };
 
