@@ -78,8 +78,8 @@ struct ModelProperties {
   /// Assignments ("n=1e8") for which nearly all light is reflected in the mirror direction; "" if there are none.
   std::string specular_limit = "";
   TabulatedChoice tabulated = {};
-  /// False for a model with so many parameters that no table of its albedo can have them all. It then has no Albedo
-  /// output.
+  /// False if no table can hold the albedo, because the model has too many parameters, or because the albedo is not a
+  /// polynomial of degree two in a colour. There is no Albedo output then.
   bool albedo_table = true;
   /// The number along which the repository stores a fit (fit/fit.h), with factors and mixed parameters open and the
   /// others at their defaults; "" if there is none.
