@@ -27,7 +27,7 @@ def _refuse_beside_another():
 def register():
     _refuse_beside_another()
     i18n.register()
-    lamps.limit_by(checks.lamps_that_fit)
+    lamps.ask(checks.lamps_that_fit, lambda: not update.others())
     operators.register()
     ui.register()
     plot_panel.register()

@@ -19,7 +19,7 @@ from pathlib import Path
 import bpy
 
 from . import convert, lamps, lean, library, measured
-from .common import argument_checks, editable
+from .common import argument_checks, editable, files
 from .common.i18n import say
 from .content.compiler import CompileError
 from .groups import automatic, bump_correction, nodes, update, usage
@@ -27,6 +27,8 @@ from .groups.update import Update
 from .lamps import Lamp
 from .lean import PlanError
 from .library import LibraryError
+from .library import measured as measured_library
+from .library.measured import MeasuredLibrary
 from .measured import Measured, MeasuredError
 from .packs import kernel, pack
 from .packs.pack import PackError
@@ -43,6 +45,7 @@ __all__ = [
     "Lamp",
     "Measured",
     "MeasuredError",
+    "MeasuredLibrary",
     "Update",
     "add_albedo",
     "add_library",
@@ -58,6 +61,7 @@ __all__ = [
     "measured_fits",
     "models",
     "new_material",
+    "new_measured_library",
     "new_measured_material",
     "new_sum",
     "plan",
@@ -71,6 +75,7 @@ __all__ = [
     "set_substance",
     "start_bake",
     "start_measured_fits",
+    "start_measured_library",
     "start_plan",
     "substances",
     "switch_representation",
@@ -145,8 +150,8 @@ def start_measured_fits(path):
 
 
 def measured_fits(path):
-    """Fits every model to a file with a measured BRDF: MERL (.binary), RGL (.bsdf), UTIA (.bin), or
-    a table (.csv). Takes some ten seconds, by the program brdfc.
+    """Fits every model to a file with a measured BRDF: MERL (.binary), RGL (.bsdf), UTIA (.bin),
+    ALTA (.alta, .dat), or a table (.csv). Takes some ten seconds, by the program brdfc.
 
     Returns a Measured: its `fits` are the models, the closest first, each with `model`,
     `parameters`, `matte` and `error`. Raises MeasuredError without the program, and for a file that
@@ -165,7 +170,7 @@ def new_measured_material(found, model=None, representation="auto"):
     """
     if not isinstance(found, Measured):
         found = measured_fits(found)
-    if model == "lobes":
+    if model == measured.SUM:
         return new_sum(found.lobe_sum().lobes, representation, found.path.stem)
     fit = found.fit(model)
     material = new_material(fit.model, representation, **fit.parameters)
@@ -173,6 +178,32 @@ def new_measured_material(found, model=None, representation="auto"):
     if fit.matte:
         measured.add_matte(material.node_tree, _the_node(material), fit.matte)
     return material
+
+
+def start_measured_library(folder, blend, model=None, representation="auto"):
+    """Starts what new_measured_library() does, and returns a job, as start_measured_fits() does."""
+    return measured_library.Making(folder, blend, model, representation)
+
+
+def new_measured_library(folder, blend, model=None, representation="auto"):
+    """Writes a .blend with a material for each measured file in a folder and its subfolders, as
+    assets of the catalogue brdfc/Measured, or one for each subfolder below it, with previews.
+
+    `model` and `representation` are those of new_measured_material(). A library of that name is
+    replaced, and a .blend with a scene or objects refused; the file of catalogues beside it, or of
+    the asset library that contains it, keeps what it has. The open file is left alone. Files and
+    folders whose names begin with a dot are left out. Takes some ten seconds a file.
+
+    Returns a MeasuredLibrary: `blend`, `catalogs`, and by file the names of its `materials`,
+    `refusals`, a sentence for each file of which no material was made, and `notes`, what the data
+    lack. Raises ValueError for arguments that are wrong, and MeasuredError without the program or
+    without any material; no file is changed then.
+    """
+    job = start_measured_library(folder, blend, model, representation)
+    try:
+        return job.wait()
+    finally:
+        job.cancel()
 
 
 def new_sum(lobes, representation="auto", name="Sum"):
@@ -343,7 +374,9 @@ def plan_conversion(materials, limit=convert.LIMIT):
     limit = argument_checks.number(limit)
     return [
         p.within(limit)
-        for p in convert.plan(argument_checks.each(argument_checks.material, materials))
+        for p in convert.plan(
+            dict.fromkeys(argument_checks.each(argument_checks.material, materials))
+        )
     ]
 
 
@@ -414,11 +447,6 @@ def used_materials():
     return {name: use.entry for name, use in usage.uses().items()}
 
 
-def _beside(path):
-    """A temporary file beside `path`, which is then renamed to it."""
-    return path.with_name(f".{path.name}.{os.getpid()}")
-
-
 def write_materials(path):
     """Writes the file for `brdfc build --materials`, which makes a pack of only what it lists.
 
@@ -430,7 +458,7 @@ def write_materials(path):
     if not materials:
         raise ValueError(_NO_MATERIAL)
     path = Path(path)
-    beside = _beside(path)
+    beside = files.beside(path)
     try:
         beside.write_text(json.dumps(lean.needs(materials), indent=1) + "\n", encoding="utf-8")
         os.replace(beside, path)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measured BRDFs: the models that come close to a file of MERL, RGL or UTIA, or to a table.
+"""Measured BRDFs: the models that come close to a file of MERL, RGL, UTIA or ALTA, or to a table.
 
 The program brdfc reads the file and fits the models.
 """
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import bpy
@@ -14,12 +14,11 @@ from .common.i18n import say
 from .common.program import ToolJob
 from .packs import pack
 
-#: The largest number of lobes in a fitted sum: with more, renders take longer, and errors hardly
-#: fall; and in any sum.
-LOBES, MOST_LOBES = 4, 12
+#: What stands for the sum of lobes where a model is asked for.
+SUM = "lobes"
 
-#: Endings of the files that the program reads: MERL, RGL, UTIA, and tables.
-ENDINGS = (".binary", ".bsdf", ".bin", ".csv")
+#: Endings of the files that the program reads: MERL, RGL, UTIA, ALTA, and tables.
+ENDINGS = (".binary", ".bsdf", ".bin", ".alta", ".dat", ".csv")
 
 
 class MeasuredError(RuntimeError):
@@ -71,10 +70,47 @@ class Measured:
     isotropic: bool
     #: What was assumed or repaired, and what the data lack, one sentence each, in English.
     notes: tuple
-    #: The models of this extension, the one that comes closest first; never empty.
+    #: The models of this extension, the one that comes closest first; empty if none was asked for.
     fits: tuple
     #: Sums of 1, 2, ... lobes, each with a smaller error than the one before; empty for black data.
     sums: tuple = ()
+    #: The program's own words, of which of_json() makes the rest.
+    told: dict = field(default_factory=dict, repr=False, compare=False)
+
+    @classmethod
+    def of_json(cls, path, told):
+        """What `brdfc measured --json` prints. Raises MeasuredError without any fit."""
+        fits = tuple(
+            Fit(
+                entry["model"],
+                _values(entry),
+                tuple(entry["matte"]) if entry["matte"] else None,
+                entry["error"],
+                entry["mirror"],
+            )
+            for entry in told["fits"]
+            if entry["model"] in pack.model_names()
+        )
+        sums = tuple(
+            LobeSum(
+                tuple(Lobe(e["model"], _values(e), e["share"]) for e in entry["lobes"]),
+                entry["error"],
+            )
+            for entry in told.get("sums", ())
+            if all(lobe["model"] in pack.model_names() for lobe in entry["lobes"])
+        )
+        if not fits and not sums:
+            raise MeasuredError(say("This extension has no model that scatters light"))
+        return cls(
+            Path(path),
+            told["format"],
+            told["grid"],
+            told["isotropic"],
+            (*told["notes"], *told["lacks"]),
+            fits,
+            sums,
+            told,
+        )
 
     def lobe_sum(self):
         """The sum that comes closest. Raises ValueError if there is none."""
@@ -98,8 +134,9 @@ class Fitting(ToolJob):
 
     failure, command = MeasuredError, "measured"
 
-    def __init__(self, path):
-        """Raises MeasuredError."""
+    def __init__(self, path, models="all", sums=True):
+        """`models`: one of them, "all" or "none". `sums`: whether sums of lobes are fitted, too.
+        Raises MeasuredError."""
         if not path:
             raise MeasuredError(say("Expected a file with a measured BRDF, got none"))
         self._path = Path(bpy.path.abspath(str(path)))
@@ -107,7 +144,8 @@ class Fitting(ToolJob):
             raise MeasuredError(say("There is no file {file}", file=path))
         super().__init__()
         self._open_folder("brdfc-measured-")
-        self._run(self._path.resolve(), "--json", "--models", "all", "--lobes", str(LOBES))
+        lobes = ("--lobes", str(most_lobes("fitted"))) if sums else ()
+        self._run(self._path.resolve(), "--json", "--models", models, *lobes)
 
     def _ended(self, status):
         try:
@@ -119,7 +157,8 @@ class Fitting(ToolJob):
                         more=self._last_words(status),
                     )
                 )
-            return self._found(json.loads(self._said.read_text(encoding="utf-8")))
+            told = json.loads(self._said.read_text(encoding="utf-8"))
+            return Measured.of_json(self._path, told)
         except (ValueError, KeyError, TypeError) as bad:
             more = f"{self._program}: {bad!r}"
             raise MeasuredError(
@@ -128,36 +167,10 @@ class Fitting(ToolJob):
         finally:
             self._folder.cleanup()
 
-    def _found(self, told):
-        fits = tuple(
-            Fit(
-                entry["model"],
-                _values(entry),
-                tuple(entry["matte"]) if entry["matte"] else None,
-                entry["error"],
-                entry["mirror"],
-            )
-            for entry in told["fits"]
-            if entry["model"] in pack.model_names()
-        )
-        if not fits:
-            raise MeasuredError(say("This extension has no model that scatters light"))
-        return Measured(
-            self._path,
-            told["format"],
-            told["grid"],
-            told["isotropic"],
-            (*told["notes"], *told["lacks"]),
-            fits,
-            tuple(
-                LobeSum(
-                    tuple(Lobe(e["model"], _values(e), e["share"]) for e in entry["lobes"]),
-                    entry["error"],
-                )
-                for entry in told["sums"]
-                if all(lobe["model"] in pack.model_names() for lobe in entry["lobes"])
-            ),
-        )
+
+def most_lobes(kind):
+    """The largest number of lobes in a sum: "most" in any, "fitted" in one that is fitted."""
+    return pack.manifest()["lobes"][kind]
 
 
 def _values(entry):
@@ -180,9 +193,10 @@ def as_pairs(lobes):
                 given=lobes,
             )
         )
-    if len(pairs) > MOST_LOBES:
+    most = most_lobes("most")
+    if len(pairs) > most:
         raise ValueError(
-            say("Expected at most {most} lobes, got {count}", most=MOST_LOBES, count=len(pairs))
+            say("Expected at most {most} lobes, got {count}", most=most, count=len(pairs))
         )
     for model, _ in pairs:
         if pack.model(model).get("two_sided"):

@@ -164,6 +164,20 @@ def area(scene, _folder):
     lamp(scene, "AREA", shape="SQUARE", size=1.0)
 
 
+def strip(scene, _folder):
+    """Adds a softbox of 2 x 0.3 m."""
+    lamp(scene, "AREA", shape="RECTANGLE", size=2.0, size_y=0.3)
+
+
+def window(scene, _folder):
+    """Adds four panes of 0.5 m with common edges, which make up a lamp of 1 m."""
+    axes = TOWARDS.to_track_quat("Z", "Y").to_matrix().transposed()
+    for x in (-0.25, 0.25):
+        for y in (-0.25, 0.25):
+            pane = lamp(scene, "AREA", f"Pane {x} {y}", share=0.25, shape="SQUARE", size=0.5)
+            pane.location += x * axes[0] + y * axes[1]
+
+
 def emissive_ball(scene, _folder):
     radius, distance = 0.2, 4.0
     strength = IRRADIANCE * distance**2 / (math.pi * radius**2)
@@ -288,6 +302,12 @@ CONDITIONS = {
     ),
 }
 
+#: Conditions that only evidence/nodes measures.
+FLAT_CONDITIONS = {
+    "strip": Condition("strip, 2 x 0.3 m", strip, "point"),
+    "window": Condition("four panes of 0.5 m", window, "point"),
+}
+
 
 # ---- scenes ------------------------------------------------------------------------------------
 
@@ -324,7 +344,7 @@ def build(name, folder, size=SIZE):
     """Builds the scene of a condition in an empty file. Returns (scene, the object that gets the
     model's material, mask of the measured pixels with row 0 at the bottom)."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    scene, condition = bpy.context.scene, CONDITIONS[name]
+    scene, condition = bpy.context.scene, (CONDITIONS | FLAT_CONDITIONS)[name]
     settings(scene, size)
     if condition.penumbra:
         return scene, *_penumbra(scene, size)

@@ -94,6 +94,12 @@ _FORM_NAMES = {
 }
 
 
+def in_percent(share):
+    """A share as a number of percent with two digits, for sentences: "0.25", "12" or "100"."""
+    text = f"{100 * share:.2g}"
+    return f"{100 * share:.0f}" if "e+" in text else text
+
+
 def form_name(form):
     """The display name of a form; its template is the text of its button."""
     return _FORM_NAMES.get(form) or Sentence(form.capitalize())

@@ -9,6 +9,7 @@ own nodes for ideal reflection and refraction.
 
 import math
 
+from ..lamps import slots
 from . import svm_constants
 from .part_groups import Parts, add_group, make_group
 from .wiring import Wiring
@@ -121,32 +122,63 @@ _SEEN = [
     ["used", "FLOAT"],
     ["active", "FLOAT"],
     ["above", "FLOAT"],
-    ["whole", "FLOAT"],
+    ["sine", "FLOAT"],
+    ["clear", "FLOAT"],
 ]
+#: Vectors of a slot, and what its shape's first number consists of.
 _SLOT = ("place", "turn", "scale", "shape")
+_CODED = [["kind", "FLOAT"], ["parts", "FLOAT"], ["plane", "FLOAT"]]
 _AXES = [
     ["across", "VECTOR"],
     ["along", "VECTOR"],
     ["away", "VECTOR"],
     ["half_across", "FLOAT"],
     ["half_along", "FLOAT"],
+    ["strip", "VECTOR"],
 ]
+#: Directions to the parts of a lamp.
+_PARTS = [[f"part {i}", "VECTOR"] for i in range(slots.MOST_PARTS)]
 #: Larger than the angle between any two directions.
 _FAR = 4.0
 
 
+def _decoded(w, shape):
+    """The numbers that lamps/slots.py combines in the first number of a slot's shape."""
+    whole = w.separate(shape)[0]
+    code = w.math("FLOOR", w.math("DIVIDE", whole, slots.CODE))
+    plane = w.math("FLOOR", w.math("DIVIDE", code, slots.CODE))
+    return {
+        "kind": w.math("MULTIPLY_ADD", code, -slots.CODE, whole),
+        "parts": w.math("MULTIPLY_ADD", plane, -slots.CODE, w.math("ADD", code, 1.0)),
+        "plane": plane,
+    }
+
+
 def _seen_group(parts):
-    """The group that computes the cone of directions towards a slot's lamp."""
+    """The group that computes the cones of directions towards a slot's lamp and its parts."""
     vectors = (*_SLOT, "at", "view", "normal")
 
     def fill(w, found):
         here = parts.on(w, found)
-        axes = here.add("axes", **found)
-        return axes | here.add("cone", **found, **axes)
+        known = found | _decoded(w, found["shape"])
+        known |= here.add("axes", **known)
+        known |= here.add("cone", **known)
+        clear = 0.0
+        for i, (name, _) in enumerate(_PARTS):
+            part = here.add("part", **known, index=float(i))
+            known[name] = part["part"]
+            clear = w.math("ADD", clear, part["clear"])
+        return {name: (known | {"clear": clear})[name] for name, _ in outputs}
 
-    content = ["seen", parts.data["axes"], parts.data["cone"]]
+    outputs = _SEEN + _CODED + _AXES + _PARTS
+    content = [
+        "seen",
+        slots.CODE,
+        slots.MOST_PARTS,
+        [parts.data[name] for name in ("axes", "cone", "part")],
+    ]
     inputs = [[name, "VECTOR"] for name in vectors]
-    return make_group("lamp seen", content, inputs, _SEEN + _AXES, fill)
+    return make_group("lamp seen", content, inputs, outputs, fill)
 
 
 def _point_of(w, towards, drop, anywhere, u):
@@ -160,14 +192,14 @@ def _point_of(w, towards, drop, anywhere, u):
 
 
 def _lamp_group(parts):
-    """The group that makes a lamp's closure, which carries the model's value in its cone, or the
-    part of it that random directions leave. Cycles skips its computations where the factor `lit`
-    is 0."""
+    """The group that makes a lamp's closures, a cone for each of its parts, which carry the model's
+    value at one of its points, or the part of it that random directions leave. Cycles skips its
+    computations where the factor `lit` is 0."""
     vectors = (*_SLOT, "towards", "at", "view", "tangent", "bitangent", "normal", "anywhere")
-    of_cone = ("chord", "flat", "room", "solid_angle", "whole")
+    of_cone = ("chord", "flat", "room", "solid_angle", "clear", "parts")
     numbers = (*of_cone, "drop", "lit", "u_0", "u_1", "u_2")
     inputs = [[name, "VECTOR"] for name in vectors] + [[name, "FLOAT"] for name in numbers]
-    inputs += _AXES
+    inputs += [["kind", "FLOAT"], *_AXES, *_PARTS]
     inputs += [[name, kind] for name, kind in parts.inputs("value").items() if name != "wi"]
     known = {name for name, _ in inputs}
     inputs += [[name, "FLOAT"] for name in svm_constants.VALUES if name not in known]
@@ -182,11 +214,23 @@ def _lamp_group(parts):
         cone = {name: found[name] for name in of_cone}
         cone |= {"emphasis": on_flat["emphasis"], "u_2": found["u_2"]}
         lobe = here.add("lobe", **at_point, **cone)
-        toon = w.toon(lobe["color"], lobe["size"], w.half(found["towards"], found["view"]))
-        return {"BSDF": w.shown(found["lit"], toon)}
+        cones = []
+        for i, (name, _) in enumerate(_PARTS):
+            toon = w.toon(lobe["color"], lobe["size"], w.half(found[name], found["view"]))
+            exists = w.math("GREATER_THAN", found["parts"], i + 0.5)
+            cones.append(w.shown(exists, toon) if i > 0 else toon)
+        return {"BSDF": w.shown(found["lit"], w.sum(cones))}
 
-    content = ["lamp", {name: parts.data[name] for name in ("value", "flat", "lobe")}]
+    used = ("value", "flat", "lobe")
+    content = ["lamp", slots.MOST_PARTS, {name: parts.data[name] for name in used}]
     return make_group(f"{parts.title}: lamp", content, inputs, [["BSDF", "SHADER"]], fill)
+
+
+def _same_plane(w, lamp, other):
+    """1 for two flat lamps that lie beside each other in one plane, so that neither can hide the
+    other, otherwise 0."""
+    same = w.math("COMPARE", lamp["plane"], other["plane"], 0.5)
+    return w.math("MULTIPLY", same, w.math("GREATER_THAN", lamp["plane"], 0.5))
 
 
 def _keep_apart(w, lamps, widest):
@@ -202,6 +246,7 @@ def _keep_apart(w, lamps, widest):
     for i, lamp in enumerate(lamps):
         for j, other in enumerate(lamps[i + 1 :], i + 1):
             distance = w.vector("DISTANCE", lamp["towards"], other["towards"], output="Value")
+            distance = w.mix(_same_plane(w, lamp, other), distance, _FAR)
             apart[i, j] = apart[j, i] = w.mix(other["used"], _FAR, distance)
     for i, lamp in enumerate(lamps):
 
@@ -218,12 +263,12 @@ def _keep_apart(w, lamps, widest):
         lamp["room"] = nearest(range(i - 1, -1, -1), w.math("MINIMUM", later, widest))
 
 
-def wire(tree, data, normal, tangent, parameters, slots, title):
+def wire(tree, data, normal, tangent, parameters, outputs_of_slots, title):
     """Adds a model's nodes as a group. Returns the outputs by name: the BSDF, and the Albedo where
     the model consists of Blender's own closures only.
 
     `data`: contents of nodes/*.json. `normal` and `tangent`: outputs that are 0 where the surface's
-    own are meant. `parameters`: outputs or numbers by name. `slots`: four outputs for each lamp.
+    own are meant. `parameters`: outputs or numbers by name. `outputs_of_slots`: four for each lamp.
     `title`: prefix of the names of the new groups.
     """
     kinds = {name: kind for part in data["parts"].values() for name, kind in part["inputs"]}
@@ -231,8 +276,8 @@ def wire(tree, data, normal, tangent, parameters, slots, title):
     values = {"Normal": (normal, "VECTOR"), "Tangent": (tangent, "VECTOR")}
     own = {name: f"parameter {name}" for name in parameters if name in kinds}
     values |= {own[name]: (parameters[name], kinds[name]) for name in own}
-    placed = [[f"lamp {i} {part}" for part in _SLOT] for i in range(len(slots))]
-    for names, slot in zip(placed, slots, strict=True):
+    placed = [[f"lamp {i} {part}" for part in _SLOT] for i in range(len(outputs_of_slots))]
+    for names, slot in zip(placed, outputs_of_slots, strict=True):
         values |= {name: (output, "VECTOR") for name, output in zip(names, slot, strict=True)}
 
     def fill(w, found):
@@ -249,7 +294,7 @@ def wire(tree, data, normal, tangent, parameters, slots, title):
     return made
 
 
-def _wired(w, data, normal, tangent, parameters, slots, title):
+def _wired(w, data, normal, tangent, parameters, of_slots, title):
     """Adds the nodes of a model; returns outputs by name, see wire()."""
     geometry = w.node("ShaderNodeNewGeometry")
     constants = svm_constants.add_values(w, geometry.outputs["Backfacing"])
@@ -292,14 +337,14 @@ def _wired(w, data, normal, tangent, parameters, slots, title):
     # All closures of a shading point are sampled with the same numbers: they are added up, so they
     # need not be independent.
     given |= {f"u_{i}": number for i, number in enumerate(surface.drawn)}
-    if slots:
+    if of_slots:
         given |= parts.add("once", **given)
         given["anywhere"] = surface.anywhere
         frame = zip(("tangent", "bitangent", "normal"), surface.axes, strict=True)
         here = {"at": surface.place, "view": surface.view, **dict(frame)}
         given |= here | constants
         seen, lit = _seen_group(parts), _lamp_group(parts)
-        for slot in slots:
+        for slot in of_slots:
             values = dict(zip(_SLOT, slot, strict=True))
             lamps.append(values | add_group(w, seen, here | values, "lamp seen"))
         _keep_apart(w, lamps, data["widest"])

@@ -71,11 +71,14 @@ def _source(socket):
 def _replace(p, parts):
     node = p.node
     groups = [_add(p, prepared) for prepared in parts]
-    group, *metal = groups
+    group, *others = groups
     group[BEFORE] = node.name
-    for other in metal:
+    for i, other in enumerate(others):
         other[HELPS] = group.name
-        other.location.y -= 300
+        other.location.y -= 300 * (i + 1)
+        for helper in p.material.node_tree.nodes:
+            if helper.get(HELPS) == other.name:
+                helper[HELPS] = group.name
     shader = _joined(p, groups)
     for link in [link for link in node.outputs[0].links if shader_trees.counts(link)]:
         target = link.to_socket
@@ -99,6 +102,8 @@ def _add(p, prepared):
     for name in (pack.NORMAL, pack.TANGENT):
         if name in node.inputs and (source := _source(node.inputs[name])):
             tree.links.new(source, present[name])
+    if prepared.part.again:
+        tree.links.new(_again(p, group, prepared.part.again), present["again"])
     for name, *law in prepared.part.widths:
         tree.links.new(_follow(tree, group, _source(node.inputs["Roughness"]), *law), present[name])
     return group
@@ -106,17 +111,19 @@ def _add(p, prepared):
 
 def _joined(p, groups):
     """The shader that replaces a node: its models, and the node's effects that they lack."""
-    shader, *metal = (group.outputs["BSDF"] for group in groups)
-    if metal:
-        shader = _mix(p, groups[0], "Metallic", shader, metal[0])
+    shader, *others = (group.outputs["BSDF"] for group in groups)
+    if p.base:
+        left = _helper(p, groups[0], "ShaderNodeMixShader")
+        p.material.node_tree.links.new(_rest(p, groups[0]), left.inputs[0])
+        p.material.node_tree.links.new(others[0], left.inputs[2])
+        shader = _sum(p, groups[0], shader, left.outputs[0])
+    if p.metal:
+        shader = _mix(p, groups[0], "Metallic", shader, others[-1])
     if p.glows:
         emission = _helper(p, groups[0], "ShaderNodeEmission")
         for name, socket in (("Color", "Emission Color"), ("Strength", "Emission Strength")):
             _give(p, emission.inputs[name], socket)
-        add = _helper(p, groups[0], "ShaderNodeAddShader")
-        p.material.node_tree.links.new(shader, add.inputs[0])
-        p.material.node_tree.links.new(emission.outputs[0], add.inputs[1])
-        shader = add.outputs[0]
+        shader = _sum(p, groups[0], shader, emission.outputs[0])
     if p.transparent:
         clear = _helper(p, groups[0], "ShaderNodeBsdfTransparent")
         shader = _mix(p, groups[0], "Alpha", clear.outputs[0], shader)
@@ -131,6 +138,71 @@ def _helper(p, group, kind):
     helper.location = (group.location.x + 220, group.location.y + 60 - 60 * count)
     helper.hide, helper[HELPS] = True, group.name
     return helper
+
+
+def _sum(p, group, first, second):
+    add = _helper(p, group, "ShaderNodeAddShader")
+    p.material.node_tree.links.new(first, add.inputs[0])
+    p.material.node_tree.links.new(second, add.inputs[1])
+    return add.outputs[0]
+
+
+def _rest(p, group):
+    """Nodes for the light that a layer leaves to its base, the polynomial of layer.rest()."""
+    tree = p.material.node_tree
+    # With this Blend, Facing is 1 minus the cosine.
+    view = _helper(p, group, "ShaderNodeLayerWeight")
+    view.inputs["Blend"].default_value = 0.5
+    if source := _source(p.node.inputs["Normal"]):
+        tree.links.new(source, view.inputs["Normal"])
+    roughness = _roughness(p, group) if len(p.rest[0]) > 1 else None
+    rows = [_polynomial(p, group, row, roughness) for row in p.rest]
+    return _polynomial(p, group, rows, view.outputs["Facing"])
+
+
+def _roughness(p, group):
+    """The linked roughness between 0 and 1."""
+    clamped = _helper(p, group, "ShaderNodeClamp")
+    p.material.node_tree.links.new(_source(p.node.inputs["Roughness"]), clamped.inputs["Value"])
+    return clamped.outputs[0]
+
+
+def _polynomial(p, group, coefficients, of):
+    """Nodes for Horner's rule. Coefficients are numbers or outputs of nodes."""
+    found = coefficients[-1]
+    for c in reversed(coefficients[:-1]):
+        found = _operation(p, group, "ShaderNodeMath", "MULTIPLY_ADD", found, of, c)
+    return found
+
+
+def _operation(p, group, kind, operation, *operands):
+    """A Math or Vector Math node. Operands are numbers, vectors or outputs of nodes."""
+    step = _helper(p, group, kind)
+    step.operation = operation
+    for socket, operand in zip(step.inputs, operands, strict=False):
+        if isinstance(operand, bpy.types.NodeSocket):
+            p.material.node_tree.links.new(operand, socket)
+        elif isinstance(operand, float) and kind == "ShaderNodeVectorMath":
+            socket.default_value = (operand,) * 3
+        else:
+            socket.default_value = operand
+    return step.outputs[0]
+
+
+def _again(p, group, law):
+    """Nodes for native_bsdf.interreflection() of a linked colour or roughness."""
+    slope, offset, mean, color = law
+
+    def vector(operation, *operands):
+        return _operation(p, group, "ShaderNodeVectorMath", operation, *operands)
+
+    source = _source(p.node.inputs[color]) or shader_values.constant(p.node.inputs[color])
+    average = vector("MULTIPLY_ADD", source, slope, offset)
+    roughness = _roughness(p, group) if len(mean) > 1 else None
+    mean = _polynomial(p, group, mean, roughness)
+    lost = _operation(p, group, "ShaderNodeMath", "SUBTRACT", mean, 1.0)
+    left = vector("MULTIPLY_ADD", average, lost, 1.0)
+    return vector("DIVIDE", vector("MULTIPLY", average, mean), left)
 
 
 def _mix(p, group, name, first, second):

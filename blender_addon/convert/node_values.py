@@ -185,12 +185,14 @@ def given_of(node, inputs):
         for name, (off, what) in _OFF.items():
             if inputs.value(name, off) != off:
                 raise Refused(say("it has {what}", what=Sentence(what)))
-        if inputs.value("Specular Tint", (1, 1, 1)) != (1, 1, 1):
-            raise Refused(say("it has a Specular Tint"))
         level, ior = inputs.value("Specular IOR Level"), inputs.value("IOR")
         given["f0"] = min(((ior - 1) / (ior + 1)) ** 2 * 2 * level, 0.9)
         metallic = 0.5 if (known := inputs.mean("Metallic")) is None else known
         given["metallic"] = min(max(metallic, 0.0), 1.0)
+        tint = inputs.value("Specular Tint", (1.0, 1.0, 1.0))
+        if tint != (1, 1, 1) and (inputs.follows("Metallic") or given["metallic"] < 1):
+            raise Refused(say("it has a Specular Tint and is not all metal"))
+        given["tint"] = tuple(min(max(c, 0.0), 1.0) for c in tint)
         given["diffuse_roughness"] = inputs.value("Diffuse Roughness")
     if inputs.follows("Roughness"):
         return given, ROUGHNESSES

@@ -7,10 +7,11 @@ from dataclasses import dataclass, field, replace
 
 from .. import lamps
 from ..common import editable
-from ..common.i18n import Sentence, say
+from ..common.i18n import Sentence, in_percent, say
 from ..groups import nodes
+from ..nearest import layer, native_bsdf
 from ..nearest.native_bsdf import Native
-from ..nearest.nearest_model import nearest, with_width
+from ..nearest.nearest_model import base_of, nearest, with_width
 from ..packs import device, pack
 from ..trees import shader_trees
 from .node_values import (
@@ -40,6 +41,18 @@ class Part:
     links: dict = field(default_factory=dict)
     #: Parameters that follow a linked roughness: (name, factor, power, low, high).
     widths: tuple = ()
+    #: The matte base beneath the model, and the light that it gets: coefficients of layer.rest().
+    base: "Part | None" = None
+    rest: tuple = ()
+    #: How the interreflection of `microfacet` follows a linked colour or roughness: the slope and
+    #: offset of the mean reflectance in the colour, the mean albedo of facets that reflect
+    #: everything, as coefficients of roughness^j, and the socket of the colour.
+    again: tuple = ()
+
+    @property
+    def label(self):
+        label = pack.model(self.model)["label"]
+        return say("{model} over {base}", model=label, base=self.base.label) if self.base else label
 
 
 @dataclass(frozen=True)
@@ -66,7 +79,8 @@ class Plan(Part):
 
     @property
     def parts(self):
-        return [self, self.metal] if self.metal else [self]
+        """The models that replace the node: the first one, its base, and the metal."""
+        return [part for part in (self, self.base, self.metal) if part]
 
     def within(self, limit):
         """The same plan, refused if its error exceeds a limit."""
@@ -80,13 +94,13 @@ class Plan(Part):
         return replace(self, refusal=why)
 
     def _label(self):
-        model, *metal = (pack.model(part.model)["label"] for part in self.parts)
-        if metal:
-            return say("{model} mixed with {metal} by Metallic", model=model, metal=metal[0])
-        return model
+        if self.metal:
+            metal = self.metal.label
+            return say("{model} mixed with {metal} by Metallic", model=self.label, metal=metal)
+        return self.label
 
     def _percent(self):
-        low, high = (f"{100 * error:.2g}" for error in (self.least_error, self.error))
+        low, high = map(in_percent, (self.least_error, self.error))
         return high if low == high else say("{low} to {high}", low=low, high=high)
 
     def line(self):
@@ -119,7 +133,9 @@ def _plan_glass(material, node):
     error = sum(abs(1 - c) for c in color) / max(sum(color), 1e-6)
     values = {} if inputs.follows("IOR") else {"ior": inputs.constant("IOR")}
     links = {"ior": "IOR"}
-    return Plan("fresnel_dielectric", values, links, (), material, node, error, error)
+    part = Part("fresnel_dielectric", values, links)
+    found = {"material": material, "node": node, "error": error, "least_error": error}
+    return Plan(**vars(part), **found)
 
 
 @functools.cache
@@ -149,7 +165,19 @@ def _part(inputs, native, fit):
         stretch = native.stretch**width.stretched if width.across else 1.0
         named = [(width.name, stretch), (width.across, 1 / stretch)]
         widths = tuple((n, factor * s, width.power, width.low, width.high) for n, s in named if n)
-    return Part(candidate.model, values, links, widths)
+    base, below = None, base_of(candidate, native, inputs.reaches("Roughness"))
+    if below:
+        linked = {name: color for name in candidate.base.candidate.links}
+        base = Part(below.model, below.values, linked)
+    again = ()
+    if "again" in values and (inputs.reaches("Roughness") or inputs.reaches(color)):
+        slope, offset = (tuple(law.tolist()) for law in native_bsdf.facet_law(native))
+        mean = layer.mean_albedo()
+        if not inputs.reaches("Roughness"):
+            mean = (float(native_bsdf.mean_facet_albedo(native.alpha)),)
+        again = slope, offset, mean, color
+    rest = below.rest if below else ()
+    return Part(candidate.model, values, links, widths, base, rest, again)
 
 
 def _plan_node(material, node):
@@ -179,23 +207,28 @@ def _plan_node(material, node):
             )
         more |= {"material": material, "node": node}
         more |= {"error": max(errors), "least_error": min(errors)}
-        return Plan(part.model, part.values, part.links, part.widths, **more)
+        return Plan(**vars(part), **more)
 
     if given["kind"] != "principled":
         part, fit = near()
         return plan(part, [fit], [error for _, error in fit.found])
     more = {"glows": glows(inputs), "transparent": is_transparent(inputs)}
+    single = None
     if not inputs.follows("Metallic"):
         part, fit = near()
-        if not (fit.lost and inputs.follows(color)) or given["metallic"] in (0, 1):
-            return plan(part, [fit], [error for _, error in fit.found], **more)
+        is_pure = given["metallic"] in (0, 1)
+        if is_pure or not (fit.lost and inputs.follows(color)):
+            single = plan(part, [fit], [error for _, error in fit.found], **more)
+        if is_pure:
+            return single
     (part, plain), (metal, fit) = near(metallic=0.0), near(metallic=1.0)
     if (share := inputs.mean("Metallic")) is None:
         errors = [error for _, error in (*plain.found, *fit.found)]
     else:
         share = min(max(share, 0.0), 1.0)
         errors = [_mixed(share, *both) for both in zip(plain.found, fit.found, strict=True)]
-    return plan(part, [plain, fit], errors, metal=metal, **more)
+    mixed = plan(part, [plain, fit], errors, metal=metal, **more)
+    return mixed if single is None or mixed.error < single.error else single
 
 
 def _mixed(share, plain, metal):

@@ -7,7 +7,7 @@ is not installed and scripts may not run. An outdated list causes noise, and los
 lamps without a size that are missing from it; apart from that, forms stay correct.
 """
 
-from .filling import count, current_scene, ensure_group, follow, last_found, limit_by, refresh
+from .filling import ask, count, current_scene, ensure_group, follow, last_found, refresh
 from .handlers import register, unregister
 from .kinds import of_light as kind_of
 from .kinds.light import has_importance
@@ -22,6 +22,7 @@ __all__ = [
     "NO_NEED",
     "SLOTS",
     "Lamp",
+    "ask",
     "by_slot",
     "count",
     "current_scene",
@@ -35,7 +36,6 @@ __all__ = [
     "kind_of",
     "lamps_of",
     "last_found",
-    "limit_by",
     "part_names",
     "refresh",
     "register",

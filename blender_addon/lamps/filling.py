@@ -22,6 +22,7 @@ def _arranged(chosen, before):
     subtracted from the lobe of a smaller lamp in front of it (docs/aimed.md). Otherwise lamps keep
     their slots, so that one more or less changes a single slot."""
     arranged, rest = [None] * slots.SLOTS, []
+    before = [slots.decoded(numbers) for numbers in before]
     for candidate in chosen:
         places = [i for i in range(min(len(chosen), len(before))) if arranged[i] is None]
         kept = next((i for i in places if shared_group.all_same(candidate.values, before[i])), None)
@@ -39,26 +40,79 @@ def _no_limit(scene):
     return None
 
 
-_room = _no_limit
+def _always():
+    return True
 
 
-def limit_by(lamps_that_fit):
-    """Sets the function that counts how many lamps the open file's materials can aim at on a
-    scene's device: given the scene, it returns a tuple that begins with the number, or None. It
-    looks into groups, which are made of this package."""
-    global _room
-    _room = lamps_that_fit
+_room, _are_codes_read = _no_limit, _always
+
+
+def ask(lamps_that_fit, are_codes_read):
+    """Sets two functions that look into groups, which are made of this package. lamps_that_fit()
+    counts how many lamps the open file's materials can aim at on a scene's device: given the scene,
+    it returns a tuple that begins with the number, or None. are_codes_read(): whether all materials
+    of the open file read slots.coded(), which those of older versions don't."""
+    global _room, _are_codes_read
+    _room, _are_codes_read = lamps_that_fit, are_codes_read
+
+
+def _most(scene):
+    """How many lamps there is room for in the open file's materials on a scene's device."""
+    found = _room(scene)
+    return slots.SLOTS * slots.MOST_PARTS if found is None else found[0]
 
 
 def limit_of(scene):
     """How many lamps materials can aim at on a scene's device."""
-    found = _room(scene)
-    return slots.SLOTS if found is None else min(found[0], slots.SLOTS)
+    return min(_most(scene), slots.SLOTS)
 
 
 def device_changed(scene):
     """Whether the scene's device has since changed to or from one that limits lamps."""
     return device.runs_on_optix(scene) != memory.on_optix
+
+
+def _parts(chosen, most):
+    """The number of parts of each chosen lamp. All of them have a closure, of which there is room
+    for `most`; parts go to lamps that are bright and long."""
+    counts = [1] * len(chosen)
+    wanted = [c.sheet.parts() if c.sheet is not None else 1 for c in chosen]
+
+    def worth(i):
+        return chosen[i].rank / counts[i] if counts[i] < wanted[i] else 0.0
+
+    while chosen and sum(counts) < most and worth(i := max(range(len(chosen)), key=worth)) > 0:
+        counts[i] += 1
+    return counts
+
+
+def _planes(chosen):
+    """The number of the plane of each chosen lamp; 0 if it is not flat, or if no other chosen lamp
+    lies beside it there. Lamps with the same number do not overlap."""
+    planes, members = [0] * len(chosen), []
+    for i, candidate in enumerate(chosen):
+        sheet = candidate.sheet
+        if sheet is None or not sheet.stays:
+            continue
+        for group in members:
+            if all(chosen[j].sheet.is_beside(sheet) for j in group):
+                group.append(i)
+                break
+        else:
+            members.append([i])
+    for plane, group in enumerate((g for g in members if len(g) > 1), 1):
+        for i in group:
+            planes[i] = plane
+    return planes
+
+
+def _numbers(chosen, most):
+    """The numbers of the slots of the chosen lamps."""
+    parts, planes = _parts(chosen, most), _planes(chosen)
+    if (max(parts, default=1) > 1 or any(planes)) and not _are_codes_read():
+        return [c.values for c in chosen]
+    found = zip(chosen, parts, planes, strict=True)
+    return [slots.coded(c.values, parts, plane) for c, parts, plane in found]
 
 
 def _worth_aiming(survey):
@@ -102,14 +156,18 @@ def _fill(scene, depsgraph, subject=None, keep=True):
     """Updates the shared group, if there is one; returns [slots.Lamp]. `keep`: lamps keep their
     slots where possible."""
     survey = _survey(scene, depsgraph, subject)
-    limit = limit_of(scene)
+    most = _most(scene)
+    limit = min(most, slots.SLOTS)
     group = shared_group.deduplicate()
     now = shared_group.written(group) if group else []
     chosen = _arranged(_worth_aiming(survey)[:limit], _by_slot(now) if group and keep else [])
     if group:
         sockets = shared_group.sockets(group)
         empty = (0.0,) * _SIZE
-        wanted = [v for c in chosen for v in c.values] + [*empty] * (slots.SLOTS - len(chosen))
+        filled = _numbers(chosen, most)
+        wanted = [v for numbers in filled for v in numbers]
+        wanted += [*empty] * (slots.SLOTS - len(chosen))
+        survey.beside = {c.name for c, n in zip(chosen, filled, strict=True) if slots.plane_of(n)}
         for (socket, _), old, new in zip(sockets, now, wanted, strict=True):
             # Writes only what changed: each change recompiles shaders and calls handlers again.
             if not shared_group.same(old, new):
@@ -184,7 +242,7 @@ def last_found(scene, group=None):
     worth = _worth_aiming(survey)
     if group is None:
         return _listed(survey, _arranged(worth[: limit_of(scene)], []))
-    there = _by_slot(shared_group.written(group))
+    there = [slots.decoded(numbers) for numbers in _by_slot(shared_group.written(group))]
     chosen = [c for c in worth if any(shared_group.all_same(c.values, slot) for slot in there)]
     return _listed(survey, chosen, slots.elsewhere(group.library))
 

@@ -2,7 +2,7 @@
 """The twelve numbers that describe a lamp in a slot of the shared group; some may be driven."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -17,6 +17,14 @@ PARTS = ("LampPlace", "LampTurn", "LampScale", "LampShape")
 #: Shapes of lamps, as numbered in the shaders (osl/brdfc.osl.in, brdfc_lamp). What the number in a
 #: slot is above a whole one belongs to the kinds that have that shape (kinds/).
 EMPTY, BALL, SUN, RECTANGLE, ELLIPSE, SKY_SUN = range(6)
+#: The number of the shape of a rectangle or an ellipse is increased by CODE times the number of its
+#: parts less one, and by CODE squared times the number of its plane, if there are others in that
+#: plane. Formula Nodes read both (content/formula_nodes.py), other shaders skip them.
+CODE = 8.0
+#: Most parts of a rectangle. Formula Nodes have a closure for each.
+MOST_PARTS = 4
+#: Index of that number in a slot.
+_SHAPE = 9
 
 
 def part_names(count):
@@ -76,6 +84,37 @@ class Driven:
         return self.path.startswith(("LOC_", "ROT_", "SCALE_"))
 
 
+@dataclass(frozen=True)
+class Sheet:
+    """A flat lamp in world space: its centre, its axes as rows, the last of which is the normal,
+    its two sizes, whether it is a rectangle, and whether it keeps its place without the
+    extension."""
+
+    centre: np.ndarray
+    axes: np.ndarray
+    sizes: tuple
+    is_rectangle: bool
+    stays: bool
+
+    def parts(self):
+        """How many parts in a row it should have."""
+        short, long = sorted(self.sizes)
+        if not self.is_rectangle or short <= 0:
+            return 1
+        return max(1, min(MOST_PARTS, round(long / short)))
+
+    def is_beside(self, other):
+        """Whether both are in one plane, shine the same way and do not overlap, in the directions
+        of this one's axes."""
+        away = (other.centre - self.centre) @ self.axes.T
+        least = 1e-4 * max(*self.sizes, *other.sizes)
+        if self.axes[2] @ other.axes[2] < 1 - 1e-6 or abs(away[2]) > least:
+            return False
+        cosines = np.abs(other.axes[:2] @ self.axes[:2].T)
+        gaps = np.abs(away[:2]) - (np.array(self.sizes) + np.array(other.sizes) @ cosines) / 2
+        return bool(gaps.max() > -least)
+
+
 @dataclass
 class Candidate:
     """A lamp with the twelve numbers of its slot; irradiance(points), (n, 3) to (n,); and
@@ -91,6 +130,7 @@ class Candidate:
     sizeless: bool = False
     met: bool = True  # random rays hit it
     uneven: bool = False  # its emission is not uniform
+    sheet: Sheet | None = None  # of a flat lamp
     #: If they depend on the subject, judge(points) sets the values and `why`, given its points,
     #: (n, 3).
     judge: object = None
@@ -114,6 +154,34 @@ def angular_size_distant(angle):
 def numbers(shape, place=(0, 0, 0), turn=(0, 0, 0), scale=(1, 1, 1), sizes=(0, 0)):
     """The twelve numbers of a slot, in the order of PARTS. The shape may be Driven."""
     return (*place, *turn, *scale, shape if isinstance(shape, Driven) else float(shape), *sizes)
+
+
+def coded(values, parts, plane):
+    """The numbers of a flat lamp with this number of parts, in a plane with this number: 0 if it is
+    alone there."""
+    shape, added = values[_SHAPE], CODE * (parts - 1 + CODE * plane)
+    if isinstance(shape, Driven):
+        shape = replace(shape, added=shape.added + added)
+    else:
+        shape += added
+    return (*values[:_SHAPE], shape, *values[_SHAPE + 1 :])
+
+
+def _code_of(values):
+    shape = values[_SHAPE]
+    number = shape.added if isinstance(shape, Driven) else shape
+    return 0 if number is None else math.floor(number / CODE)
+
+
+def plane_of(values):
+    """The number of the plane that coded() was given."""
+    return _code_of(values) // int(CODE)
+
+
+def decoded(values):
+    """coded() undone."""
+    code = _code_of(values)
+    return coded(values, 1 - code, 0) if code else values
 
 
 def turned(direction):

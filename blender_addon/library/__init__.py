@@ -30,6 +30,9 @@ NAME = "brdfc"
 STAMP = "brdfc.json"
 BLEND = "materials.blend"
 CATALOGS = "blender_assets.cats.txt"
+#: File with the reason, by path, why no material was made of a measured file.
+REFUSALS = "refusals.json"
+CATALOGS_HEAD = "VERSION 1\n\n"
 #: Catalogue for models that materials.json does not use.
 _REST = "More Models"
 #: Namespace of the UUIDs of catalogues: with the path it gives an identifier that never changes.
@@ -123,16 +126,24 @@ def catalog_id(catalog):
     return str(uuid.uuid5(_NAMESPACE, catalog))
 
 
+def with_parents(paths):
+    """Paths of catalogues and of those that contain them, sorted: Blender would add the latter and
+    then report unsaved changes."""
+    paths = {PurePosixPath(path) for path in paths}
+    return sorted(paths | {parent for path in paths for parent in list(path.parents)[:-1]})
+
+
+def catalog_line(identifier, path):
+    """The line that defines a catalogue."""
+    return f"{identifier}:{path}:{str(path).replace('/', '-')}\n"
+
+
 def catalogs_text(found):
     """Content of the file that defines the catalogues of these entries."""
-    paths = {PurePosixPath(NAME, entry.catalog): None for entry in found}
-    # Includes parent catalogues: Blender would add them and then report unsaved changes.
-    paths |= {parent: None for path in paths for parent in list(path.parents)[:-1]}
-    lines = [
-        (catalog_id(path.relative_to(NAME).as_posix()), str(path), str(path).replace("/", "-"))
-        for path in sorted(paths)
-    ]
-    return "VERSION 1\n\n" + "".join(":".join(line) + "\n" for line in lines)
+    return CATALOGS_HEAD + "".join(
+        catalog_line(catalog_id(path.relative_to(NAME).as_posix()), path)
+        for path in with_parents(PurePosixPath(NAME, entry.catalog) for entry in found)
+    )
 
 
 def stamp():
@@ -171,12 +182,18 @@ def _program():
     return bpy.app.binary_path
 
 
-def _command(target):
+def build_command(*arguments):
+    """The command that runs build.py in a second Blender."""
     build = str(_HERE / "build.py")
     if not _program():
-        return [sys.executable, build, "--", target]
+        return [sys.executable, build, "--", *arguments]
     options = ["--background", "--factory-startup", "--python-exit-code", "1", "--python", build]
-    return [_program(), *options, "--", target]
+    return [_program(), *options, "--", *arguments]
+
+
+def count_made(log):
+    """The number of materials that build.py has made, by its log."""
+    return len(re.findall(r"^brdfc: made ", log, re.M))
 
 
 class Making(ProgramJob):
@@ -191,7 +208,7 @@ class Making(ProgramJob):
         self._count = len(entries())
         self._made = self._open_folder("brdfc-library-") / "library"
         self._made.mkdir()
-        command = _command(str(self._made))
+        command = build_command(str(self._made))
         try:
             self._start(command)
         except OSError as failed:
@@ -200,7 +217,7 @@ class Making(ProgramJob):
             ) from failed
 
     def _share(self, log):
-        return min(len(re.findall(r"^brdfc: made ", log, re.M)) / self._count, 0.99)
+        return min(count_made(log) / self._count, 0.99)
 
     def _ended(self, status):
         if status != 0 or not (self._made / STAMP).is_file():

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes the library's files; run by a separate Blender, whose open file is discarded:
 
-    blender --background --factory-startup --python build.py -- FOLDER
+    blender --background --factory-startup --python build.py -- FOLDER [LIST]
 
-The extension need not be enabled there. Exit status: 0, or 1 with the reason in the last line.
+Without a list it makes the library of ready-made materials; the list, which measured.py writes, is
+of measured files and what was fitted to them. The extension need not be enabled there. Exit status:
+0, or 1 with the reason in the last line.
 """
 
 import importlib.util
@@ -13,10 +15,11 @@ import sys
 from pathlib import Path
 
 import bpy
-import numpy as np
 
 AUTHOR = "brdfc contributors"
 LICENSE = "GPL-3.0-or-later"
+#: What the functions below are given of the extension.
+MODULES = ("library", "library.preview", "api")
 
 
 def load_package():
@@ -31,20 +34,11 @@ def load_package():
     return spec.name
 
 
-def set_preview(material, path):
-    """Sets the preview of a material from an image file, which is left unchanged."""
-    image = bpy.data.images.load(str(path))
-    try:
-        pixels = np.empty(len(image.pixels), np.float32)
-        image.pixels.foreach_get(pixels)
-        preview = material.preview_ensure()
-        preview.image_size = tuple(image.size)
-        preview.image_pixels_float.foreach_set(pixels)
-    finally:
-        bpy.data.images.remove(image)
+def write(path, materials):
+    bpy.data.libraries.write(str(path), materials, compress=True)
 
 
-def make(library, api, entry):
+def make(library, preview, api, entry):
     material = library.make(api, entry)
     material.name = entry.name
     material.asset_mark()
@@ -55,28 +49,63 @@ def make(library, api, entry):
     for tag in library.tags(entry):
         data.tags.new(tag, skip_if_exists=True)
     if entry.preview.is_file():
-        set_preview(material, entry.preview)
+        preview.set_preview(material, entry.preview)
     print(f"brdfc: made {entry.name}", flush=True)
     return material
 
 
-def main(folder):
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    bpy.context.scene.render.engine = "CYCLES"
-    package = load_package()
-    library = importlib.import_module(f"{package}.library")
-    api = importlib.import_module(f"{package}.api")
+def make_all(folder, library, preview, api):
     found = library.entries()
-    materials = {make(library, api, entry) for entry in found}
-    folder = Path(folder)
-    bpy.data.libraries.write(str(folder / library.BLEND), materials, compress=True)
+    write(folder / library.BLEND, {make(library, preview, api, entry) for entry in found})
     (folder / library.CATALOGS).write_text(library.catalogs_text(found), encoding="utf-8")
     (folder / library.STAMP).write_text(json.dumps(library.stamp()) + "\n", encoding="utf-8")
 
 
+def make_measured(folder, library, preview, api, fits):
+    """Makes a material of each file, with a picture of it. A material that can't be made is left
+    out, and told in the file of refusals."""
+    scene, ball = preview.make_scene(preview.SIZE, preview.SAMPLES)
+    picture = folder / "preview.jpg"
+    materials, refusals = set(), {}
+    for entry in json.loads(fits.read_text(encoding="utf-8")):
+        found = api.Measured.of_json(entry["path"], entry["told"])
+        try:
+            material = api.new_measured_material(found, entry["model"], entry["representation"])
+        except (ValueError, RuntimeError) as error:
+            refusals[entry["path"]] = str(error)
+            continue
+        material.name = entry["name"]
+        preview.render(api, scene, ball, material, picture)
+        material.asset_mark()
+        data = material.asset_data
+        data.description, data.catalog_id = entry["description"], entry["catalog_id"]
+        for tag in entry["tags"]:
+            data.tags.new(tag, skip_if_exists=True)
+        preview.set_preview(material, picture)
+        materials.add(material)
+        print(f"brdfc: made {entry['name']}", flush=True)
+    for item in list(scene.objects):
+        bpy.data.objects.remove(item)
+    api.see_lamps(scene)  # so that no material holds the lamps of the pictures
+    if materials:
+        write(folder / library.BLEND, materials)
+    (folder / library.REFUSALS).write_text(json.dumps(refusals), encoding="utf-8")
+
+
+def main(folder, *fits):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.scene.render.engine = "CYCLES"
+    package = load_package()
+    parts = [importlib.import_module(f"{package}.{name}") for name in MODULES]
+    if fits:
+        make_measured(Path(folder), *parts, Path(fits[0]))
+    else:
+        make_all(Path(folder), *parts)
+
+
 if __name__ == "__main__":
     try:
-        main(sys.argv[sys.argv.index("--") + 1])
+        main(*sys.argv[sys.argv.index("--") + 1 :])
     except Exception as error:
         print(f"{type(error).__name__}: {error}", flush=True)
         os._exit(1)

@@ -6,7 +6,8 @@ wo to the viewer. The formulas are those of Cycles 4.5 to 5.2 (kernel/closure/bs
 bsdf_oren_nayar.h); tests/blender/test_convert.py compares them with its renders.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,6 +35,8 @@ class Native:
     f0: float = 0.04
     #: Roughness of the diffuse base of a Principled node.
     diffuse_roughness: float = 0.0
+    #: Specular Tint of a Principled node: a factor of a metal's reflectance at 82 degrees.
+    tint: tuple = (1.0, 1.0, 1.0)
 
     @property
     def alpha(self):
@@ -56,6 +59,11 @@ def dielectric(f0, cosine):
     return 0.5 * a**2 * (1 + b**2)
 
 
+def mean_dielectric(f0):
+    """The cosine-weighted mean of dielectric() over the hemisphere."""
+    return float((dielectric(f0, _MU) * _SHARE).sum())
+
+
 def _clamp_to_one(color):
     """Cycles clamps the colour of metal microfacets and of multiple scattering to 1."""
     return np.minimum(color, 1)
@@ -69,6 +77,23 @@ def schlick(color, cosine):
 def mean_schlick(color):
     """The cosine-weighted mean of schlick() over the hemisphere."""
     return (20 * _clamp_to_one(color) + 1) / 21
+
+
+def _edge_loss(native):
+    """The factor of cos (1 - cos)^6 that a metal's Specular Tint takes from schlick()."""
+    strongest = 1 / 7 * (6 / 7) ** 6
+    return (1 - _clamp_to_one(native.tint)) * schlick(native.color, np.array(1 / 7)) / strongest
+
+
+def metal_fresnel(native, cosine):
+    """Reflectance of a metal: Schlick's with an edge tint, after Kutz et al. 2021."""
+    c = np.clip(cosine, 0, 1)[..., None]
+    return np.clip(schlick(native.color, cosine) - _edge_loss(native) * c * (1 - c) ** 6, 0, 1)
+
+
+def mean_metal_fresnel(native):
+    """The cosine-weighted mean of metal_fresnel(), as Cycles computes it."""
+    return np.clip(mean_schlick(native.color) - _edge_loss(native) / 126, 0, 1)
 
 
 def _shadow(w, alpha, beckmann):
@@ -136,19 +161,45 @@ def mean_facet_albedo(alpha):
     return (facet_albedo(views, alpha, False) * _SHARE).sum()
 
 
+def interreflection(average, mean):
+    """The share of the light that microfacets would reflect again which they do reflect. `average`:
+    mean reflectance of a microfacet. `mean`: albedo of microfacets that reflect everything,
+    averaged over views."""
+    return average * mean / (1 - average * (1 - mean))
+
+
 def multiple_scattering_factor(average, mean, seen):
-    """The factor by which multiple scattering between microfacets raises the albedo. `average`:
-    mean reflectance of a microfacet. `mean` and `seen`: albedo of microfacets that reflect
-    everything, averaged over views and from the viewer."""
-    return 1 + average * mean / (1 - average * (1 - mean)) * (1 - seen) / seen
+    """The factor by which multiple scattering between microfacets raises the albedo. `seen`: as
+    `mean`, from the viewer."""
+    return 1 + interreflection(average, mean) * (1 - seen) / seen
+
+
+def facet_law(native):
+    """The slope and offset, (3,) each, of the mean reflectance of a node's microfacets in its
+    colour: those of the metal, if it is one."""
+    if native.kind == "glossy":
+        return np.ones(3), np.zeros(3)
+    if native.metallic == 0:
+        return np.zeros(3), np.full(3, mean_dielectric(native.f0))
+    black, white = (mean_metal_fresnel(replace(native, color=c)) for c in ((0.0,) * 3, (1.0,) * 3))
+    return white - black, black
+
+
+def again(native):
+    """The interreflection() of a node with Multiscatter GGX, as a colour."""
+    slope, offset = facet_law(native)
+    average = slope * _clamp_to_one(native.color) + offset
+    found = interreflection(average, mean_facet_albedo(native.alpha))
+    return tuple(float(c) for c in np.clip(found, 0, 1))
 
 
 def _multiscatter(wo, native, average):
     """The factor (n, 3) of multiple scattering; `average`: mean reflectance of a microfacet."""
     if not native.multiscatter or native.beckmann:
         return np.ones((len(wo), 3))
+    average = np.broadcast_to(average, 3)
     seen = facet_albedo(wo, native.alpha, False)[:, None]
-    return multiple_scattering_factor(np.asarray(average), mean_facet_albedo(native.alpha), seen)
+    return multiple_scattering_factor(average, mean_facet_albedo(native.alpha), seen)
 
 
 def _oren_nayar_G(cosine):
@@ -177,21 +228,42 @@ def matte(wi, wo, color, roughness):
     return nl[..., None] * ((a + b * t)[..., None] + again * lost[..., None]) * color
 
 
+class ViewTerms(NamedTuple):
+    """The quantities of Glossy and Principled that depend on the view alone, for each view."""
+
+    #: Fraction of light that the dielectric interface keeps from the base, (k,).
+    taken: np.ndarray
+    #: Factors of multiple scattering between microfacets of the interface, (k,), and of metal, (k,
+    #: 3).
+    gloss: np.ndarray
+    metal: np.ndarray
+
+    def of(self, which):
+        """The same for directions, given the index of each one's view."""
+        return ViewTerms(*(each[which] for each in self))
+
+
 def view_terms(native, each):
-    """The quantities of Glossy and Principled that depend on the view alone, for each view (k, 3):
-    the fraction of light that the dielectric interface keeps from the base, (k,), and the factor of
-    multiple scattering between metal microfacets, (k, 3)."""
+    """The ViewTerms of views (k, 3)."""
+    none = ViewTerms(np.zeros(len(each)), np.ones(len(each)), np.ones((len(each), 3)))
     if native.is_mirror:
-        return dielectric(native.f0, each[:, 2]), np.ones((len(each), 3))
+        return none._replace(taken=dielectric(native.f0, each[:, 2]))
     color = np.asarray(native.color, np.float64)
     if native.kind == "glossy":
-        return np.zeros(len(each)), _multiscatter(each, native, color)
-    taken, scale = np.zeros(len(each)), np.ones((len(each), 3))
+        return none._replace(metal=_multiscatter(each, native, color))
+    terms = none
     if native.metallic < 1:
         taken = facet_albedo(each, native.alpha, False, lambda c: dielectric(native.f0, c))
+        if native.multiscatter:
+            gloss = _multiscatter(each, native, mean_dielectric(native.f0))[:, 0]
+            terms = terms._replace(taken=taken * gloss, gloss=gloss)
+        else:
+            # Cycles keeps from the base what facets would reflect if they hid no light.
+            whole = facet_albedo(each, native.alpha, False)
+            terms = terms._replace(taken=taken / whole)
     if native.metallic > 0:
-        scale = _multiscatter(each, native, mean_schlick(color))
-    return taken, scale
+        terms = terms._replace(metal=_multiscatter(each, native, mean_metal_fresnel(native)))
+    return terms
 
 
 def f_cos(native, wi, wo, views):
@@ -200,33 +272,37 @@ def f_cos(native, wi, wo, views):
     if native.kind == "diffuse":
         return matte(wi, wo, native.color, native.roughness)
     each, which = views
-    taken, scale = view_terms(native, each)
-    return f_cos_of_view(native, wi, wo, taken[which], scale[which])
+    return f_cos_of_view(native, wi, wo, view_terms(native, each).of(which))
 
 
-def f_cos_of_view(native, wi, wo, taken, scale):
-    """The same for Glossy and Principled, given view_terms() of each wo."""
+def f_cos_of_view(native, wi, wo, terms):
+    """The same for Glossy and Principled, given the ViewTerms of each wo."""
     lobe = np.zeros(len(wi)) if native.is_mirror else facets(wi, wo, native.alpha, native.beckmann)
     lobe = lobe[:, None]
     color = np.asarray(native.color, np.float64)
     if native.kind == "glossy":
-        return color * lobe * scale
+        return color * lobe * terms.metal
     cosine = (wo * half(wi, wo)).sum(-1)
-    base = matte(wi, wo, color, native.diffuse_roughness) * (1 - taken)[:, None]
-    plastic = base + lobe * dielectric(native.f0, cosine)[:, None]
-    metal = lobe * schlick(color, cosine) * scale
+    base = matte(wi, wo, color, native.diffuse_roughness) * (1 - terms.taken)[:, None]
+    plastic = base + lobe * (dielectric(native.f0, cosine) * terms.gloss)[:, None]
+    metal = lobe * metal_fresnel(native, cosine) * terms.metal
     return (1 - native.metallic) * plastic + native.metallic * metal
 
 
-def albedo(native, each, taken, scale):
+def albedo(native, each, terms):
     """Directional albedo (k, 3) of a Principled node with a smooth base, including ideal mirror
-    reflection, given view_terms() of each view (k, 3)."""
+    reflection, given the ViewTerms of views (k, 3)."""
     color = np.asarray(native.color, np.float64)
-    plastic, metal = taken[:, None] + color * (1 - taken)[:, None], 0.0
+    seen, metal = terms.taken, 0.0
     if native.is_mirror:
-        metal = schlick(color, each[:, 2])
-    elif native.metallic > 0:
-        metal = facet_albedo(each, native.alpha, False, lambda c: schlick(color, c)) * scale
+        metal = metal_fresnel(native, each[:, 2])
+    else:
+        if native.metallic < 1 and not native.multiscatter:
+            seen = seen * facet_albedo(each, native.alpha, False)
+        if native.metallic > 0:
+            metal = facet_albedo(each, native.alpha, False, lambda c: metal_fresnel(native, c))
+            metal = metal * terms.metal
+    plastic = seen[:, None] + color * (1 - terms.taken)[:, None]
     return (1 - native.metallic) * plastic + native.metallic * metal
 
 
@@ -237,4 +313,4 @@ def mirror(native, wo):
     if native.kind == "glossy":
         return np.broadcast_to(np.asarray(native.color, np.float64), (len(wo), 3))
     plastic = dielectric(native.f0, wo[:, 2])[:, None]
-    return (1 - native.metallic) * plastic + native.metallic * schlick(native.color, wo[:, 2])
+    return (1 - native.metallic) * plastic + native.metallic * metal_fresnel(native, wo[:, 2])

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from . import native_bsdf
+from . import layer, native_bsdf
 
 #: View cosines at which models are compared, and the number of light directions for each.
 VIEWS = (0.95, 0.75, 0.5, 0.25)
@@ -55,6 +55,40 @@ class Candidate:
     width: Width | None = None
     #: The parameter that each of the node's sockets corresponds to.
     links: dict = field(default_factory=dict)
+    #: The Fit of the matte base beneath this glossy layer, which has the light that the layer's
+    #: albedo leaves.
+    base: "Fit | None" = None
+
+    @property
+    def is_colored(self):
+        """Whether it has a parameter for the node's colour."""
+        below = self.base.candidate.links if self.base else {}
+        return "Color" in (*self.links.values(), *below.values())
+
+
+@dataclass(frozen=True)
+class Base:
+    """A matte base with its values, and the light that it gets: coefficients of layer.rest()."""
+
+    model: str
+    values: dict
+    rest: tuple
+
+
+def base_of(candidate, native, follows=False):
+    """The Base of a candidate for a node; None if it has none. `follows`: whether the polynomial is
+    one for all roughnesses."""
+    if candidate.base is None:
+        return None
+    fit = candidate.base
+    values = with_width(fit.candidate, _matte_of(native), fit.factor)
+    rest = layer.rest(native.f0, native.multiscatter, None if follows else native.roughness)
+    return Base(fit.candidate.model, values, rest)
+
+
+def _matte_of(native):
+    """The base of a Principled node."""
+    return native_bsdf.Native("diffuse", native.color, native.diffuse_roughness)
 
 
 def _grey(color):
@@ -75,8 +109,18 @@ def _base(native):
     return tuple(min(share * c / max(1 - m, 1e-6), 1.0) for c, m in mixed)
 
 
+def _distribution(native):
+    """The distribution of `microfacet` that is the node's own."""
+    if native.beckmann:
+        return {"distribution": "beckmann"}
+    if not native.multiscatter:
+        return {}
+    return {"distribution": "multiscatter_ggx", "again": native_bsdf.again(native)}
+
+
 _SLOPE = {"low": 1e-3, "high": 1.0, "power": 2}
 _EXPONENT = {"low": 1.0, "high": 1e6, "power": -4, "usual": 2.0}
+_FACETS = Width("ax", 1e-4, 1.0, 2, across="ay", stretched=0.5)
 _COLORED = (
     Candidate(
         "cook_torrance",
@@ -86,8 +130,8 @@ _COLORED = (
     ),
     Candidate(
         "microfacet",
-        lambda n: {"f0": n.color, "tint": (1.0, 1.0, 1.0)},
-        Width("ax", 1e-4, 1.0, 2, across="ay", stretched=0.5),
+        lambda n: {"f0": n.color, "tint": n.tint, **_distribution(n)},
+        _FACETS,
         {"f0": "Color"},
     ),
     Candidate(
@@ -121,6 +165,12 @@ _MIRRORS = (
     Candidate("max_phong", lambda n: {"ks": n.color, "e": _SHARP}, links={"ks": "Color"}),
 )
 _METAL_MIRROR = Candidate("schlick", lambda n: {"r": n.color, "rough": 0.0}, links={"r": "Color"})
+#: Facets as steep as the narrowest lobe by which directions are sampled.
+_TINTED_MIRROR = Candidate(
+    "microfacet",
+    lambda n: {"f0": n.color, "tint": n.tint, "ax": _NARROWEST, "ay": _NARROWEST},
+    links={"f0": "Color"},
+)
 _COATED = Candidate("coupled", lambda n: {"r0": n.f0, "rm": n.color}, None, {"rm": "Color"})
 
 
@@ -144,9 +194,23 @@ def _polished(links, sharp=False):
     )
 
 
-def candidates(native):
-    """The candidates for a node. A model without a highlight is no candidate for a node that has
-    one, however weak."""
+def _layered(native, has):
+    """A glossy layer of microfacets over the nearest matte base."""
+    base = nearest((_matte_of(native),), (), False, has)
+    if base is None:
+        return ()
+    f0, tint = layer.schlick_like(native.f0)
+    values = {"f0": (f0,) * 3, "tint": (tint,) * 3}
+    return (Candidate("microfacet", lambda n: values | _distribution(n), _FACETS, base=base),)
+
+
+def candidates(native, has=lambda model, values: True):
+    """The candidates for a node, among the models and values for which has(model, values) is true.
+    A model without a highlight is no candidate for a node that has one, however weak."""
+    return tuple(c for c in _candidates(native, has) if has(c.model, c.values(native)))
+
+
+def _candidates(native, has):
     if native.kind == "diffuse" or (native.kind == "principled" and _mixed(native) == (0, 0, 0)):
         return _MATTE
     if native.is_mirror and native.kind == "glossy":
@@ -154,12 +218,16 @@ def candidates(native):
     if native.is_mirror and native.metallic == 0:
         return (_COATED,)
     if native.is_mirror:
+        if native.tint != (1, 1, 1):
+            return (_METAL_MIRROR, _TINTED_MIRROR)
         return (_METAL_MIRROR,) if native.metallic == 1 else _polished({}, sharp=True)
     if native.kind == "glossy":
         return _COLORED
     if native.metallic == 1:
         return (*_COLORED, *_polished({"rs": "Color"}))
-    return _polished({"rd": "Color"} if native.metallic == 0 else {})
+    if native.metallic == 0:
+        return (*_polished({"rd": "Color"}), *_layered(native, has))
+    return _polished({})
 
 
 # ---- how near ------------------------------------------------------------------------------------
@@ -258,35 +326,45 @@ class Target:
         self.mirror = native_bsdf.mirror(native, self.at.each)
         self.total = self.at.light(self.f_cos) + self.mirror
 
-    def _differences(self, model, values):
+    def _f_cos(self, model, values, base, which=slice(None)):
+        """f cos of a model over a Base, or None, at some of the directions."""
+        from ..brdfc import model as formulas
+
+        wi, wo = self.at.wi[which], self.at.wo[which]
+        f = formulas(model).eval(wi, wo, **values)
+        if base:
+            left = layer.rest_at(base.rest, self.at.each[:, 2], self.native.roughness)
+            below = formulas(base.model).eval(wi, wo, **base.values)
+            f = f + below * left[self.at.which[which], None]
+        return f * wi[:, 2:]
+
+    def _differences(self, model, values, base):
         """Model minus node: of f cos, and of the mirror reflection's weight."""
         from ..brdfc import model as formulas
 
-        formula, at = formulas(model), self.at
-        f = formula.eval(at.wi, at.wo, **values) * at.wi[:, 2:]
-        return f - self.f_cos, formula.mirror(at.each, **values) - self.mirror
+        mirror = formulas(model).mirror(self.at.each, **values)
+        return self._f_cos(model, values, base) - self.f_cos, mirror - self.mirror
 
     def _mean(self, differences):
         return float((differences.sum(1) / np.maximum(self.total.sum(1), 1e-9)).mean())
 
-    def misplaced(self, model, values):
-        """Fraction of the light of point lamps that the model misplaces, mean over views and
-        channels."""
-        f_cos, mirror = self._differences(model, values)
+    def misplaced(self, model, values, base=None):
+        """Fraction of the light of point lamps that a model over a Base misplaces, mean over views
+        and channels."""
+        f_cos, mirror = self._differences(model, values, base)
         return self._mean(self.at.light(np.abs(f_cos)) + np.abs(mirror))
 
-    def roughly_misplaced(self, model, values):
+    def roughly_misplaced(self, model, values, base=None):
         """The same from a subset of the directions, in arbitrary units, to compare widths that are
         far apart."""
-        from ..brdfc import model as formulas
+        few = slice(None, None, _ROUGH_STRIDE)
+        off = np.abs(self._f_cos(model, values, base, few) - self.f_cos[few])
+        return float((off.sum(1) * self.at.weight[few]).sum())
 
-        at, few = self.at, slice(None, None, _ROUGH_STRIDE)
-        f = formulas(model).eval(at.wi[few], at.wo[few], **values) * at.wi[few, 2:]
-        return float((np.abs(f - self.f_cos[few]).sum(1) * at.weight[few]).sum())
-
-    def error(self, model, values):
+    def error(self, model, values, base=None):
         """The same under lamps as wide as windows, from all sides: the error that pictures show."""
-        return self._mean(np.abs(self.at.light_of_lamps(*self._differences(model, values))).sum(1))
+        differences = self._differences(model, values, base)
+        return self._mean(np.abs(self.at.light_of_lamps(*differences)).sum(1))
 
 
 def with_width(candidate, native, factor):
@@ -326,12 +404,10 @@ def nearest(natives, colors, colored, has):
     native, targets, found = natives[0], [Target(n) for n in natives], []
     # The width hardly depends on the base, so it is fitted once for all of them.
     roughly, closely = {}, {}
-    for candidate in candidates(native):
-        if not has(candidate.model, candidate.values(native)):
-            continue
+    for candidate in candidates(native, has):
         if native.stretch != 1 and not (candidate.width and candidate.width.across):
             continue
-        lost = colored and "Color" not in candidate.links.values()
+        lost = colored and not candidate.is_colored
         key = candidate.model, candidate.width
         if key not in roughly:
             roughly[key] = _rough_width(candidate, targets)
@@ -367,9 +443,18 @@ def _light_and_error(candidate, targets, factor, color):
 
 
 def _mean(measure, candidate, targets, factor):
-    """The mean of one of Target's methods over nodes that differ in roughness."""
-    values = [with_width(candidate, t.native, factor) for t in targets]
-    found = [measure(t, candidate.model, v) for t, v in zip(targets, values, strict=True)]
+    """The mean of one of Target's methods over nodes that differ in roughness; with several of them
+    the roughness is linked."""
+    follows = len(targets) > 1
+    found = [
+        measure(
+            t,
+            candidate.model,
+            with_width(candidate, t.native, factor),
+            base_of(candidate, t.native, follows),
+        )
+        for t in targets
+    ]
     return sum(found) / len(found)
 
 

@@ -104,7 +104,10 @@ class Search:
                     lambda c: np.stack([native_bsdf.dielectric(f0, c) for f0 in _F0], -1),
                 )[0]
             )
-        self._albedos = knots, np.column_stack([seen, mean, taken])
+        seen, mean = np.array(seen)[:, None], np.array(mean)[:, None]
+        average = np.array([native_bsdf.mean_dielectric(f0) for f0 in _F0])
+        self._gloss = native_bsdf.multiple_scattering_factor(average, mean, seen)
+        self._albedos = knots, np.concatenate([seen, mean, taken * self._gloss], 1)
         self._coarse = self._parts(_ROUGHNESS)
 
     def _parts(self, roughness):
@@ -112,13 +115,15 @@ class Search:
         by the square roots of the angles' areas; their scalar products; and albedos (from wo,
         average, for each IOR)."""
         wo = np.broadcast_to(self.wo, self.wi.shape)
+        knots, albedos = self._albedos
         rows = []
         for r in roughness:
             lobe = native_bsdf.facets(self.wi, wo, (r * r, r * r))
             metal = np.stack([(1 - self._edge) * lobe, self._edge * lobe])
-            rows.append(np.concatenate([self._base[None], metal, self._fresnel * lobe]))
+            gloss = [np.interp(r, knots, column) for column in self._gloss.T]
+            fresnel = np.array(gloss)[:, None] * self._fresnel
+            rows.append(np.concatenate([self._base[None], metal, fresnel * lobe]))
         rows = np.stack(rows) * np.sqrt(self.area)
-        knots, albedos = self._albedos
         found = np.stack([np.interp(roughness, knots, column) for column in albedos.T], -1)
         return roughness, rows, rows @ rows.transpose(0, 2, 1), found
 
@@ -248,7 +253,7 @@ def _smooth_node(curve, search, cosines, shares, here):
     native = _native(0.0, metallic, ior, tuple(float(c) for c in color))
     each = search.wo[None]
     mirror = native_bsdf.mirror(native, each)[0]
-    base = (1 - metallic) * (1 - native_bsdf.view_terms(native, each)[0]) * color
+    base = (1 - metallic) * (1 - native_bsdf.view_terms(native, each).taken) * color
     refracted, scattered = (base, 0 * base) if through else (0 * base, base)
     found = np.zeros_like(curve) if through else node_slice(native, search.wi, search.wo)
     off = np.abs(mirror - here.mirror).sum() + np.abs(refracted - here.refracted).sum()

@@ -9,6 +9,7 @@ from .lean import BRDFC_OT_bake, BRDFC_OT_bake_apply, BRDFC_OT_bake_plan, BRDFC_
 from .measured import (
     BRDFC_FH_measured,
     BRDFC_OT_choose_measured,
+    BRDFC_OT_new_measured_library,
     BRDFC_OT_new_measured_material,
 )
 from .model import (
@@ -46,6 +47,7 @@ _CLASSES = (
     BRDFC_OT_add_node,
     BRDFC_OT_new_material,
     BRDFC_OT_new_measured_material,
+    BRDFC_OT_new_measured_library,
     BRDFC_OT_choose_measured,
     BRDFC_FH_measured,
     BRDFC_OT_search,

@@ -4,22 +4,22 @@
 from pathlib import Path
 
 import bpy
-from bpy.props import EnumProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy.types import FileHandler, Operator
 
 from .. import api
-from ..common.i18n import Sentence, iface, rpt, say
+from ..common.i18n import Sentence, iface, in_percent, rpt, say
 from ..groups import nodes
-from ..measured import ENDINGS
+from ..measured import ENDINGS, SUM
 from ..packs import pack
 from ..panels.labels import wrapped
 from .adding import BRDFC_OT_new_material
 from .common import ERRORS, ModalJob, refused, report_osl
 
+#: The file that a library of measured materials is written to.
+MEASURED_BLEND = "measured.blend"
 #: Models that the dialog offers, the closest first.
 OFFERED = 8
-#: What stands for the sum of lobes among them.
-LOBES = "lobes"
 
 
 def _assign(operator, context, material):
@@ -35,7 +35,8 @@ class BRDFC_OT_new_measured_material(ModalJob, Operator):
     bl_label = "New Measured Material..."
     bl_description = (
         "Make a material that comes close to a measured BRDF: a file of MERL (.binary), RGL "
-        "(.bsdf) or UTIA (.bin), or a table (.csv). The program brdfc fits every model to it"
+        "(.bsdf), UTIA (.bin) or ALTA (.alta, .dat), or a table (.csv). The program brdfc fits "
+        "every model to it"
     )
     bl_options = {"REGISTER", "UNDO"}
 
@@ -81,6 +82,68 @@ class BRDFC_OT_new_measured_material(ModalJob, Operator):
         return {"FINISHED"}
 
 
+class BRDFC_OT_new_measured_library(ModalJob, Operator):
+    bl_idname = "brdfc.new_measured_library"
+    bl_label = "New Measured Library..."
+    bl_description = (
+        "Make an asset of each measured BRDF in a folder and its subfolders, with the model that "
+        "comes closest and a preview, and write them to measured.blend in that folder"
+    )
+    bl_options = {"REGISTER"}
+
+    directory: StringProperty(
+        name="Folder",
+        description="The folder with the measurements",
+        subtype="DIR_PATH",
+        options={"SKIP_SAVE"},
+    )
+    filter_folder: BoolProperty(default=True, options={"HIDDEN"})
+
+    def invoke(self, context, event):
+        if not self.directory:
+            context.window_manager.fileselect_add(self)
+            self.browsed = True
+            return {"RUNNING_MODAL"}
+        try:
+            return self.begin(context, api.start_measured_library(*self._paths()))
+        except ERRORS as error:
+            return refused(self, error)
+
+    def _paths(self):
+        return self.directory, Path(self.directory) / MEASURED_BLEND
+
+    def work(self):
+        return say("Fitting models to the files in {folder}", folder=Path(self.directory).name)
+
+    def finish(self, context, made):
+        for path, why in made.refusals.items():
+            said = say("{file}: {reason}", file=path.name, reason=why)
+            self.report({"WARNING"}, rpt(said))
+        if made.notes:
+            said = say(
+                "Files with notes on what their data lack, which the descriptions of their assets "
+                "have: {count}",
+                count=len(made.notes),
+            )
+            self.report({"INFO"}, rpt(said))
+        said = say(
+            "{file} has {count} materials: name its folder in Preferences > File Paths > Asset "
+            "Libraries to see them in the Asset Browser",
+            file=made.blend.name,
+            count=len(made.materials),
+        )
+        self.report({"INFO"}, rpt(said))
+        return {"FINISHED"}
+
+    def execute(self, context):
+        if getattr(self, "browsed", False):
+            return bpy.ops.brdfc.new_measured_library("INVOKE_DEFAULT", directory=self.directory)
+        try:
+            return self.finish(context, api.new_measured_library(*self._paths()))
+        except ERRORS as error:
+            return refused(self, error)
+
+
 #: Keeps the texts alive: Blender holds no reference to the items of a dynamic list.
 _listed = []
 
@@ -94,7 +157,7 @@ def _fits_as_items(_operator, _context):
                 say(
                     "{model}: {percent} % of the light in other directions",
                     model=pack.model(fit.model)["label"],
-                    percent=f"{100 * fit.error:.2g}",
+                    percent=in_percent(fit.error),
                 )
             ),
             pack.model(fit.model)["doc"],
@@ -110,10 +173,10 @@ def _sum_as_item(found):
     said = say(
         "Sum of {count} lobes: {percent} % of the light in other directions",
         count=len(found.lobes),
-        percent=f"{100 * found.error:.2g}",
+        percent=in_percent(found.error),
     )
     names = " + ".join(pack.model(lobe.model)["label"] for lobe in found.lobes)
-    return (LOBES, iface(said), names)
+    return (SUM, iface(said), names)
 
 
 class BRDFC_OT_choose_measured(Operator):
@@ -146,12 +209,12 @@ class BRDFC_OT_choose_measured(Operator):
             wrapped(column, line, pixels=480)
         self.layout.separator()
         self.layout.column().prop(self, "model", expand=True)
-        if self.model == LOBES:
+        if self.model == SUM:
             parts = (
                 say(
                     "{model}: {percent} %",
                     model=pack.model(lobe.model)["label"],
-                    percent=f"{100 * lobe.share:.2g}",
+                    percent=in_percent(lobe.share),
                 )
                 for lobe in self.found.lobe_sum().lobes
             )
@@ -162,7 +225,7 @@ class BRDFC_OT_choose_measured(Operator):
         if fit.matte:
             grey = sum(fit.matte) / 3
             said = say(
-                "A matte surface that reflects {percent} % is added", percent=f"{100 * grey:.2g}"
+                "A matte surface that reflects {percent} % is added", percent=in_percent(grey)
             )
             wrapped(self.layout.column(align=True), said, pixels=480)
 

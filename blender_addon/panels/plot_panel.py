@@ -9,7 +9,7 @@ import numpy as np
 from bpy.types import Panel
 
 from ..common import color
-from ..common.i18n import form_name, of_error, say
+from ..common.i18n import form_name, in_percent, of_error, say
 from ..groups import nodes
 from ..packs import pack
 from .labels import wrapped
@@ -73,7 +73,7 @@ def picture(node):
 
 
 def _percent(share):
-    return f"{round(100 * share, 2):.2g}" if share < 1 else f"{100 * share:.0f}"
+    return in_percent(round(share, 4))
 
 
 def _shares(color):

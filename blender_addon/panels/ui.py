@@ -9,7 +9,7 @@ from bpy.types import Menu, Panel
 
 from .. import convert, lamps
 from ..common import color, editable
-from ..common.i18n import form_name, iface, of_error, say
+from ..common.i18n import form_name, iface, in_percent, of_error, say
 from ..content import group_content
 from ..groups import nodes
 from ..packs import device, energy, kernel, optical, pack
@@ -71,6 +71,7 @@ def draw_add_menu(self, context):
 def draw_material_menu(self, context):
     self.layout.menu(MATERIAL_MT_brdfc.bl_idname, icon="SHADING_RENDERED")
     self.layout.operator("brdfc.new_measured_material", icon="FILE_FOLDER")
+    self.layout.operator("brdfc.new_measured_library", icon="ASSET_MANAGER")
     self.layout.operator("brdfc.convert", icon="FILE_REFRESH")
 
 
@@ -97,7 +98,7 @@ def percent(part):
     """A fraction in percent; rounding errors count as 0."""
     if part < ROUNDING:
         return say("none")
-    return say("{percent} %", percent=f"{100 * part:.2g}")
+    return say("{percent} %", percent=in_percent(part))
 
 
 #: Smaller errors are rounding errors of single precision.

@@ -422,14 +422,15 @@ def _of_form(model, values, form, shares, width):
 def _of_node(near):
     """The same for a Principled node."""
     native, wo = near.native, _directions()
-    taken, scale = native_bsdf.view_terms(native, wo)
+    terms = native_bsdf.view_terms(native, wo)
     _, wi, viewers, _ = _ball()
     # np.interp needs increasing cosines, but they decrease from view to view.
-    at = [np.interp(viewers[:, 2], _views()[::-1], x[::-1]) for x in (taken, *scale.T)]
-    of_view = at[0], np.stack(at[1:], axis=-1)
-    f_cos = native_bsdf.f_cos_of_view(native, wi, viewers, *of_view) * (not near.transmission)
+    columns = terms.taken, terms.gloss, *terms.metal.T
+    taken, gloss, *metal = (np.interp(viewers[:, 2], _views()[::-1], x[::-1]) for x in columns)
+    of_view = native_bsdf.ViewTerms(taken, gloss, np.stack(metal, axis=-1))
+    f_cos = native_bsdf.f_cos_of_view(native, wi, viewers, of_view) * (not near.transmission)
     ball = ball_light(f_cos, native_bsdf.mirror(native, viewers))
-    return near.curve, native_bsdf.albedo(native, wo, taken, scale), ball
+    return near.curve, native_bsdf.albedo(native, wo, terms), ball
 
 
 def light(model, values, form=None):

@@ -4,7 +4,7 @@
 import bpy
 
 from ..common import i18n
-from ..common.i18n import Sentence, say
+from ..common.i18n import Sentence, in_percent, say
 from ..groups import nodes
 from ..packs import device, pack
 from . import closure_pool
@@ -45,7 +45,7 @@ def _by_twin(finding, ours):
         said = say(
             "{reason}: Blender's own nodes stand in, error {percent} %",
             reason=finding.message,
-            percent=f"{100 * max(off):.2g}",
+            percent=in_percent(max(off)),
         )
     return Finding(finding.code, WARNING, said)
 

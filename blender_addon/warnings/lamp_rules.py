@@ -136,6 +136,15 @@ def hidden_from_rays(at):
     return _any([x for x in at.lamps if not (x.visible_diffuse and x.visible_glossy)])
 
 
+def sheared_lamps(at):
+    """Area lamps are sheared. In Cycles, random rays bring another amount of their light than light
+    sampling does, so Formula Nodes and sampled forms differ from Blender's own nodes."""
+    drawn = "zero_size_lights" in at.cycles_form.get("warnings", []) if at.cycles_form else False
+    if not drawn and not (at.aims and nodes.runs_anywhere(at.node)):
+        return []
+    return _any([x for x in at.lamps if lamps.kind_of(x.data).is_distorted(x.matrix_world)])
+
+
 def small_lamps(at):
     """Lamps are below 1 cm, or suns below 0.02 rad: random rays hit them too rarely."""
     return _any([item for item in at.lamps if lamps.kind_of(item.data).is_tiny(item.data)])

@@ -193,6 +193,13 @@ OF_NODE = (
         "model that takes away differs with the render method",
         lamp_rules.hidden_from_rays,
     ),
+    Row(
+        "sheared_lamps",
+        WARNING,
+        "Area lamps ({lamps}) are sheared by a parent that is scaled unevenly: highlights are up "
+        "to a third too dark or too bright; apply the parent's scale",
+        lamp_rules.sheared_lamps,
+    ),
 )
 
 #: About a group node whose form declares the code in the manifest (Form::warnings() of the

@@ -7,6 +7,7 @@
 #include "app/commands.h"
 #include "app/f_cos.h"
 #include "core/csv.h"
+#include "core/text.h"
 #include "fit/fit.h"
 #include "fit/terms.h"
 #include "fit/twin.h"
@@ -22,10 +23,10 @@ void print_errors(const std::vector<fit::ViewError>& errors, const std::string& 
   std::vector<double> l1;
   for (const fit::ViewError& e : errors) l1.push_back(e.relative_l1);
   std::sort(l1.begin(), l1.end());
-  // The q-quantile of the errors over views, in percent.
-  const auto quantile = [&](double q) { return 100 * l1[std::size_t(std::ceil(q * double(l1.size()))) - 1]; };
-  fmt::print(stderr, "{}: of the light off, over views: median {:.2g} %, 95th percentile {:.2g} %, at most {:.2g} %\n",
-             label, quantile(0.5), quantile(0.95), quantile(1));
+  // The q-quantile of the errors over views.
+  const auto quantile = [&](double q) { return in_percent(l1[std::size_t(std::ceil(q * double(l1.size()))) - 1]); };
+  fmt::print(stderr, "{}: of the light off, over views: median {} %, 95th percentile {} %, at most {} %\n", label,
+             quantile(0.5), quantile(0.95), quantile(1));
   CsvWriter out((axis.empty() ? "" : axis + ",") + "cos_theta_o,relative_l1,relative_l2,albedo,negative");
   for (const fit::ViewError& e : errors) {
     std::vector<double> row = {e.cos_theta_o, e.relative_l1, e.relative_l2, e.albedo, e.negative};

@@ -8,6 +8,7 @@
 #include "app/commands.h"
 #include "app/numbers.h"
 #include "core/csv.h"
+#include "core/text.h"
 #include "measured/findings.h"
 #include "measured/fit_lobes.h"
 #include "measured/fit_models.h"
@@ -55,7 +56,7 @@ Json describe(const measured::LobeSum& sum) {
                      {"share", sum.share[i]}});
   return {{"error", sum.error},
           {"lobes", lobes},
-          {"brightest", {{"albedo", sum.brightest}, {"degrees", sum.brightest_at}}},
+          {"brightest", {{"albedo", sum.brightest.albedo}, {"degrees", sum.brightest.degrees}}},
           {"seconds", sum.seconds}};
 }
 
@@ -79,9 +80,7 @@ void print_sums(const std::vector<measured::LobeSum>& sums, int asked) {
     fmt::print("  {:>6.2f} %  {} {}\n", 100 * last.share[i], info.name,
                format_values(info, measured::rounded(last.lobes[i].values)));
   }
-  if (last.brightest > 1.005)
-    fmt::print("  the sum reflects more light than it gets: {:.3g} times seen at {:g} degrees\n", last.brightest,
-               last.brightest_at);
+  if (const auto said = measured::gain_of_sum(last.brightest)) fmt::print("  {}\n", *said);
 }
 
 /// f and pdf for pairs of directions from stdin.
@@ -116,7 +115,8 @@ void add_measured_command(CLI::App& app) {
       "What a file with a measured BRDF holds, what it lacks, how much light it reflects, and every model fitted to "
       "it,\n"
       "the best first: the share of the light that the model sends in other directions, and its parameters.\n"
-      "FILE is one of the MERL database (.binary), of RGL (.bsdf), of UTIA (.bin), or a table (.csv) with the columns\n"
+      "FILE is one of the MERL database (.binary), of RGL (.bsdf), of UTIA (.bin), of ALTA as text (.alta, .dat),\n"
+      "or a table (.csv) with the columns\n"
       "theta_i,phi_i,theta_o,phi_o in degrees (theta_i_rad,... in radians), or wi_x,wi_y,wi_z,wo_x,wo_y,wo_z, and "
       "r,g,b in 1/sr, a row for every\n"
       "combination of angles. Colours are linear Rec.709.");
@@ -126,7 +126,7 @@ void add_measured_command(CLI::App& app) {
       ->delimiter(',')
       ->capture_default_str();
   CLI::Option* lobes =
-      add_number(*cmd, "--lobes", o->lobes, {1, measured::kMostLobes},
+      add_number(*cmd, "--lobes", o->lobes, {1, kMostLobes},
                  "Sums of 1, 2, ... up to this number of lobes, each with its error. Models are fitted only if\n"
                  "--models names them then");
   cmd->add_option("--from", o->from,
@@ -206,12 +206,13 @@ void add_measured_command(CLI::App& app) {
       for (const std::string& sentence : *sentences) fmt::print("  {}\n", sentence);
     if (!fits.empty()) fmt::print("\n  {:<22}{:>10}  {:>6}  parameters\n", "model", "misplaced", "time");
     for (const measured::ModelFit& f : fits)
-      fmt::print(
-          "  {:<22}{:>8.2f} %  {:>4.1f} s  {}{}\n", f.model->info().name, 100 * f.error, f.seconds,
-          format_values(f.model->info(), measured::rounded(f.values)),
-          (f.matte ? fmt::format(" and Lambert {:.4g},{:.4g},{:.4g}", f.matte->r, f.matte->g, f.matte->b) : "") +
-              (f.mirror > 0 ? fmt::format("; its mirror, {:.2g} % of a white world, is not in the data", 100 * f.mirror)
-                            : ""));
+      fmt::print("  {:<22}{:>8.2f} %  {:>4.1f} s  {}{}\n", f.model->info().name, 100 * f.error, f.seconds,
+                 format_values(f.model->info(), measured::rounded(f.values)),
+                 (f.matte ? fmt::format(" and Lambert {:.4g},{:.4g},{:.4g}", f.matte->r, f.matte->g, f.matte->b) : "") +
+                     (measured::has_mirror(f)
+                          ? fmt::format("; its mirror, {} % of a white world, is not in the data", in_percent(f.mirror))
+                          : ""));
+    if (const auto why = measured::order_of_fits(fits)) fmt::print("  {}\n", *why);
     if (o->lobes) print_sums(sums, *o->lobes);
   });
 }

@@ -29,13 +29,14 @@ struct Case {
 
 /// The albedo for one view, by quadrature and as the mean of samples.
 struct AlbedoFound {
-  double highest = 0;       ///< largest channel
-  double off_one = 0;       ///< largest distance of a channel from 1
-  double error = 0;         ///< error of the quadrature
-  double table_error = 0;   ///< error of tables inside the model's f
-  double difference = 0;    ///< from the mean of samples, largest channel, without delta terms
-  double sample_error = 0;  ///< standard error of that mean
-  bool white = false;       ///< all colours are 1
+  double highest = 0;        ///< largest channel
+  double off_one = 0;        ///< largest distance of a channel from 1
+  double error = 0;          ///< error of the quadrature
+  double table_error = 0;    ///< error of tables inside the model's f
+  double difference = 0;     ///< from the mean of samples, largest channel, without delta terms
+  double sample_error = 0;   ///< standard error of that mean
+  bool white = false;        ///< all colours are 1
+  bool compensated = false;  ///< the case has the model's compensated choice
   std::string where;
 };
 

@@ -37,6 +37,7 @@ AlbedoFound measure(const Trial& t, const Case& c, const measure::BoundModel& m,
           difference(),
           s.standard_error,
           white,
+          is_compensated(t.info(), c.bound.values),
           fmt::format("{} cos_theta_o={:.6g} phi_o={:.6g}", m.label, cos_o, phi)};
 }
 
@@ -70,7 +71,8 @@ std::vector<AlbedoFound> albedos_of(const Trial& t, const Case& c) {
 }
 
 void conserving(const Trial& t, Verdict& verdict) {
-  for (const AlbedoFound& a : t.albedos()) verdict.add(a.highest, a.where, kAlbedo + a.error + a.table_error);
+  for (const AlbedoFound& a : t.albedos())
+    if (!a.compensated) verdict.add(a.highest, a.where, kAlbedo + a.error + a.table_error);
 }
 
 void gaining(const Trial& t, Verdict& verdict) {

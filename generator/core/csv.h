@@ -37,6 +37,7 @@ class CsvReader {
   bool next(std::vector<double>& row);
   /// The place of the row read last, for messages: "stdin line 7".
   std::string where() const;
+  int line() const { return line_; }
   /// The unit vector in three columns starting at `first`. Throws unless its length is 1 within 1e-6; the result is
   /// normalised in double precision.
   Vec3<double> unit_vector(const std::vector<double>& row, std::size_t first) const;

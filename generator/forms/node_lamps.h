@@ -11,10 +11,11 @@
 // that is small for the lobe. The two parts add up to f cos in every direction.
 //
 // A ball or a sun fills its cone. A rectangle or an ellipse does not: its cone is the largest that fits into it, and
-// carries the light of the whole lamp. Cycles drops closures with a small weight, so the cone of a small lamp is
-// widened until it carries kWidened of the light; that share of the light beside the lamp then counts twice. If two
-// cones overlap, the earlier lamp in the list, which is sorted by size with the widest first, is left to drawn
-// directions. Otherwise light in the overlap would count twice.
+// carries the light of the whole lamp. A long rectangle has several parts in a row, with a cone each; all of them carry
+// the same value, so that the model's formula runs once. Cycles drops closures with a small weight, so the cone of a
+// small lamp is widened until it carries kWidened of the light; that share of the light beside the lamp then counts
+// twice. If two cones overlap, the earlier lamp in the list, which is sorted by size with the widest first, is left to
+// drawn directions. Otherwise light in the overlap would count twice.
 //
 // The formulas run only as nodes (print/node_program.h), for which a division by 0 and the root of a negative number
 // give 0.
@@ -25,14 +26,20 @@
 
 namespace brdfc::forms {
 
-/// The contents of a lamp slot: see brdfc_lamp() in osl/brdfc.osl.in and blender_addon/lamps/slots.py.
-template <class T> struct LampSlot { Vec3<T> place, turn, scale, shape; };
+/// The contents of a lamp slot: see brdfc_lamp() in osl/brdfc.osl.in and blender_addon/lamps/slots.py. `kind` and
+/// `parts` come from shape.x.
+template <class T> struct LampSlot {
+  Vec3<T> place, turn, scale, shape;
+  T kind;
+  T parts;  ///< number of parts of a rectangle, along its longer side
+};
 
 /// The orientation and size of a lamp, from its slot. It does not depend on the shading point, so Cycles computes it
 /// once.
 template <class T> struct LampAxes {
   Vec3<T> across, along, away;  ///< unit vectors; `away` points away from the shining side
   T half_across, half_along;    ///< half axes of a rectangle or an ellipse
+  Vec3<T> strip;                ///< half the longer axis of a rectangle with several parts; otherwise 0
 };
 template <class T> LampAxes<T> lamp_axes(const LampSlot<T>& slot) {
   const Vec3<T>& q = slot.turn;
@@ -43,22 +50,26 @@ template <class T> LampAxes<T> lamp_axes(const LampSlot<T>& slot) {
   axes.away = {T(2) * (q.x * q.z + w * q.y), T(2) * (q.y * q.z - w * q.x), T(1) - T(2) * (q.x * q.x + q.y * q.y)};
   axes.half_across = abs(slot.shape.y * slot.scale.x) / T(2);
   axes.half_along = abs(slot.shape.z * slot.scale.y) / T(2);
+  const Vec3<T> longer =
+      select(axes.half_along < axes.half_across, axes.across * axes.half_across, axes.along * axes.half_along);
+  axes.strip = longer * select(T(1.5) < slot.parts, T(1), T(0));
   return axes;
 }
 
 /// A lamp as seen from a shading point. Radii are given as chords (the distance between the tips of two unit vectors),
 /// which take fewer nodes than angles.
 template <class T> struct LampCone {
-  Vec3<T> towards;  ///< unit vector along the axis
-  T drop;           ///< 1 - cos of the radius of the largest cone within the lamp
-  T solid_angle;    ///< of that cone; 0 for a lamp that drawn directions can't hit
+  Vec3<T> towards;  ///< unit vector to the middle of the lamp
+  T drop;           ///< 1 - cos of the radius of the largest cone within the lamp, or within each of its parts
+  T solid_angle;    ///< of all cones; 0 for a lamp that drawn directions can't hit
+  T sine;           ///< of the radius of each cone
   T chord;          ///< radius of the closure; for a ball or a sun it includes a seam
   T reach;          ///< radius of a cone around the whole lamp
   T flat;           ///< 1 for a rectangle or an ellipse, otherwise 0
   T used;           ///< 0 for an empty slot, otherwise 1
   T active;         ///< 0 for an empty slot and for a lamp that is left to drawn directions, otherwise 1
   T above;          ///< 1 if a part of the lamp is above the horizon, otherwise 0
-  T whole;          ///< the whole cone divided by its part above the horizon
+  T clear;          ///< the number of cones above the horizon, with fractions: see part_of_strip()
 };
 
 /// Half the width of the lobe of a drawn direction, which is also its minimum distance from lamps.
@@ -73,9 +84,7 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& slot, const LampAxes<T
   /// size given to lamps without size. kLeastRise is the minimum height of the cone's rim over the horizon of the
   /// closure's normal.
   constexpr double kWidest = 2.25 / 3.25, kPoint = 1e-8, kLeastRise = 0.01;
-  /// If a smaller part of a cone is above the horizon, light is lost; otherwise few samples would have to carry it.
-  constexpr double kLeastPart = 0.05;
-  const T kind = slot.shape.x;
+  const T kind = slot.kind;
   const auto ball = kind < T(1.5);
   const auto sun = kind > T(1.5) && kind < T(2.5);
   const auto flat = kind > T(2.5) && kind < T(4.5);
@@ -89,46 +98,65 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& slot, const LampAxes<T
   // Squared sines of the radii.
   const T of_ball = sqr(slot.shape.y) / distance2;
   const T of_sun = sqr(sin(minimum(abs(slot.shape.y) / T(2), T(1.5))));
-  // The largest cone about the centre that fits within a disk: its rim touches the disk where the plane recedes.
-  const T facing = dot(lamp.away, cone.towards), slant = sqrt(T(1) - facing * facing);
-  const T within = minimum(lamp.half_across, lamp.half_along) * nearness;
+  // The largest cone about the centre that fits within a disk: its rim touches the disk where the plane recedes. All
+  // parts have the cone of the farthest one, the first or the last.
+  const Vec3<T> end = lamp.strip * (T(1) - T(1) / slot.parts);
+  const T height_of_lamp = dot(lamp.away, centre);
+  const T farthest = T(1) / sqrt(distance2 + dot(end, end) + T(2) * abs(dot(end, centre)));
+  const T facing = height_of_lamp * farthest, slant = sqrt(T(1) - facing * facing);
+  const T narrower = minimum(lamp.half_across, lamp.half_along), longer = maximum(lamp.half_across, lamp.half_along);
+  const T within = minimum(narrower, longer / slot.parts) * farthest;
   const T tangent = within * facing / (T(1) + within * slant), tangent2 = tangent * tangent;
   const T size2 = select(ball, of_ball, select(flat, tangent2 / (T(1) + tangent2), of_sun));
   const T sine2 = maximum(size2, T(kPoint));
-  const T sine = sqrt(sine2);
+  cone.sine = sqrt(sine2);
   cone.drop = sine2 / (T(1) + sqrt(T(1) - sine2));
   // blender_addon/lamps/slots.py: the first size is negative for lamps that drawn directions don't hit.
   const auto hit = size2 > T(kPoint) && T(0) < slot.shape.y;
-  cone.solid_angle = select(hit, cone.drop * T(2 * kPi), T(0));
+  cone.solid_angle = select(hit, cone.drop * T(2 * kPi) * slot.parts, T(0));
   // The cone of a rectangle carries all of the rectangle's light, so it must not be widened.
   cone.chord = sqrt(T(2) * cone.drop) + select(flat, T(0), T(2 * kNarrow));
   const T diagonal = sqrt(sqr(lamp.half_across) + sqr(lamp.half_along));
   cone.reach = select(flat, diagonal * nearness + T(2 * kNarrow), cone.chord);
   cone.flat = select(flat, T(1), T(0));
-  // Twice the squared cosine between the closure's normal and the cone's axis. The whole cone has to be above the
-  // horizon of that normal.
-  const T rise2 = T(2) * dot(cone.towards, wo) + T(2), least = T(2) * sine + T(2 * kLeastRise);
+  // Twice the squared cosine between the closure's normal and the cone's axis. The whole cone, of every part, has to be
+  // above the horizon of that normal.
+  const T least = T(2) * cone.sine + T(2 * kLeastRise) + select(T(1.5) < slot.parts, cone.reach, T(0));
+  const T rise2 = T(2) * dot(cone.towards, wo) + T(2);
   const auto used = kind > T(0.5);
   const auto usable = used && sine2 < T(kWidest) && rise2 > least * least;
-  const auto shines_here = select(flat, facing, T(1)) > T(0.01);
+  const auto shines_here = select(flat, height_of_lamp * nearness, T(1)) > T(0.01);
   cone.used = select(used, T(1), T(0));
   cone.active = select(usable && shines_here, T(1), T(0));
-  const T height = dot(cone.towards, normal);
-  cone.above = select(T(0) < height + cone.reach, T(1), T(0));
-  // f is averaged over the whole lamp, with zeros below the horizon, and the surface hides that part of the cone. This
-  // approximates the part of a disk above a line, to 0.02.
-  const T x = maximum(minimum(height / sine, T(1)), T(-1));
-  cone.whole = T(1) / maximum(x * (T(0.75) - T(0.25) * (x * x)) + T(0.5), T(kLeastPart));
+  cone.above = select(T(0) < dot(cone.towards, normal) + cone.reach, T(1), T(0));
   return cone;
 }
 
-/// The solid angle that a point of a rectangle or an ellipse stands for, divided by `of_cone`, that of the cone within
-/// the lamp. `cosine`: between `away` and the direction to the point, whose squared distance is given.
-template <class T>
-T emphasis_at(const LampSlot<T>& slot, const LampAxes<T>& lamp, const T& cosine, const T& distance2, const T& of_cone) {
-  const auto round = slot.shape.x > T(3.5);
+/// A part of a lamp, counted from 0 along the strip; every lamp has the first.
+template <class T> struct LampPart {
+  Vec3<T> towards;  ///< unit vector along the axis of its cone
+  T clear;  ///< the fraction of its cone that is above the horizon, or 0 if the lamp does not have so many parts
+};
+/// `normal`: see cone_of().
+template <class T> LampPart<T> part_of_strip(const LampSlot<T>& slot, const LampAxes<T>& lamp, const LampCone<T>& cone,
+                                             const Vec3<T>& at, const T& index, const Vec3<T>& normal) {
+  const T offset = (T(2) * index + T(1)) / slot.parts - T(1);
+  const Vec3<T> middle = lamp.strip * offset + (slot.place - at);
+  LampPart<T> part;
+  part.towards = select(T(1.5) < slot.parts, middle * (T(1) / sqrt(dot(middle, middle))), cone.towards);
+  // This approximates the part of a disk above a line, to 0.02.
+  const T x = maximum(minimum(dot(part.towards, normal) / cone.sine, T(1)), T(-1));
+  part.clear = select(index < slot.parts, x * (T(0.75) - T(0.25) * (x * x)) + T(0.5), T(0));
+  return part;
+}
+
+/// The solid angle that a point of a rectangle or an ellipse stands for, divided by `of_cones`, that of all cones
+/// within the lamp. `cosine`: between `away` and the direction to the point, whose squared distance is given.
+template <class T> T emphasis_at(const LampSlot<T>& slot, const LampAxes<T>& lamp, const T& cosine, const T& distance2,
+                                 const T& of_cones) {
+  const auto round = slot.kind > T(3.5);
   const T area = lamp.half_across * lamp.half_along * select(round, T(kPi), T(4));
-  return area * cosine / (distance2 * of_cone);
+  return area * cosine / (distance2 * of_cones);
 }
 
 /// A point of a rectangle or an ellipse, chosen by two numbers in [0, 1).
@@ -138,7 +166,7 @@ template <class T> struct FlatPoint {
 };
 template <class T> FlatPoint<T> flat_point(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
                                            const T& drop, const T& u, const T& v) {
-  const auto round = slot.shape.x > T(3.5);
+  const auto round = slot.kind > T(3.5);
   const T radius = sqrt(u), turn = T(2) * pi<T>() * v;
   const T x = select(round, radius * cos(turn), T(2) * u - T(1));
   const T y = select(round, radius * sin(turn), T(2) * v - T(1));
@@ -147,7 +175,7 @@ template <class T> FlatPoint<T> flat_point(const LampSlot<T>& slot, const LampAx
   FlatPoint<T> out;
   out.wi = p * (T(1) / sqrt(distance2));
   const T cosine = maximum(dot(lamp.away, out.wi), T(0));
-  out.emphasis = emphasis_at(slot, lamp, cosine, distance2, drop * T(2 * kPi));
+  out.emphasis = emphasis_at(slot, lamp, cosine, distance2, drop * T(2 * kPi) * slot.parts);
   return out;
 }
 
@@ -163,7 +191,7 @@ template <class T> T part_of_lamp(const LampCone<T>& cone, const T& emphasis, co
 /// passes so close that its lobe would, otherwise 0.
 template <class T> T met_part(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
                               const LampCone<T>& cone, const Vec3<T>& ray, const T& density) {
-  const auto flat = slot.shape.x > T(2.5) && slot.shape.x<T(4.5), round = slot.shape.x> T(3.5);
+  const auto flat = slot.kind > T(2.5) && slot.kind<T(4.5), round = slot.kind> T(3.5);
   const Vec3<T> centre = slot.place - at;
   const T slope = dot(lamp.away, ray), distance = dot(lamp.away, centre) / slope;
   const Vec3<T> off = ray * distance - centre;
@@ -185,18 +213,22 @@ template <class T> T kept(const T& weight, const T& u) {
   return select(u < chance, T(1), T(0)) / minimum(chance, T(1));
 }
 
-/// The inputs of a Toon closure that carries `value`, as f cos, over the cone: as much of it as part_of_lamp() says.
-/// For a ball or a sun it may be wider than the cone.
+/// The inputs of the Toon closures, one for each part, that carry `value`, as f cos, over the cone: as much of it as
+/// part_of_lamp() says. For a ball or a sun it may be wider than the cone.
 template <class T> struct ToonLobe {
   Rgb<T> color;
   T size;  ///< in units of 90 degrees, as in the node
 };
 /// `room`: the radius that it may have without covering another lamp. `emphasis`, `density`: at the point where the
 /// value is taken.
-template <class T> ToonLobe<T> toon_lobe(const LampCone<T>& cone, const T& emphasis, const T& density, const T& room,
-                                         const Rgb<T>& value, const T& u) {
+template <class T> ToonLobe<T> toon_lobe(const T& parts, const LampCone<T>& cone, const T& emphasis, const T& density,
+                                         const T& room, const Rgb<T>& value, const T& u) {
   constexpr double kWidened = 2e-4;
-  const T factor = emphasis * cone.whole * part_of_lamp(cone, emphasis, density);
+  // f is averaged over the whole lamp, with zeros below the horizon, and the surface hides that part of the cones. If a
+  // smaller part of them is above the horizon, light is lost; otherwise few samples would have to carry it.
+  constexpr double kLeastPart = 0.05;
+  const T whole = parts / maximum(cone.clear, T(kLeastPart) * parts);
+  const T factor = emphasis * whole * part_of_lamp(cone, emphasis, density);
   const T largest = max_component(value) * factor;
   const T wide = minimum(sqrt(T(kWidened / kPi) / largest), room);
   const T chord = maximum(cone.chord, select(cone.flat > T(0.5), T(0), wide)), chord2 = chord * chord;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "forms/node_parts.h"
 
+#include <fmt/format.h>
+
 #include "forms/node_lamps.h"
 #include "model/horizon.h"
 #include "trace/program.h"
@@ -27,16 +29,20 @@ template <class Outputs> NodeProgram recorded(const Outputs& outputs) {
   return print::node_program(program, node_vectors());
 }
 
-LampSlot<Expr> slot_input() { return {input3("place"), input3("turn"), input3("scale"), input3("shape")}; }
+LampSlot<Expr> slot_input() {
+  return {input3("place"), input3("turn"), input3("scale"), input3("shape"), Expr::input("kind"), Expr::input("parts")};
+}
 LampAxes<Expr> axes_input() {
-  return {input3("across"), input3("along"), input3("away"), Expr::input("half_across"), Expr::input("half_along")};
+  return {input3("across"),           input3("along"),           input3("away"),
+          Expr::input("half_across"), Expr::input("half_along"), input3("strip")};
 }
 
 }  // namespace
 
 const std::set<std::string>& node_vectors() {
-  static const std::set<std::string> names = {"across", "along",   "at",   "away", "normal", "place", "ray", "scale",
-                                              "shape",  "towards", "true", "turn", "view",   "wi",    "wo"};
+  static const std::set<std::string> names = {"across", "along", "at",    "away",  "normal", "part",
+                                              "place",  "ray",   "scale", "shape", "strip",  "towards",
+                                              "true",   "turn",  "view",  "wi",    "wo"};
   return names;
 }
 
@@ -71,6 +77,7 @@ NodeProgram record_axes() {
     p.output("away", axes.away);
     p.output("half_across", axes.half_across);
     p.output("half_along", axes.half_along);
+    p.output("strip", axes.strip);
   });
 }
 NodeProgram record_cone() {
@@ -85,7 +92,18 @@ NodeProgram record_cone() {
     p.output("used", cone.used);
     p.output("active", cone.active);
     p.output("above", cone.above);
-    p.output("whole", cone.whole);
+    p.output("sine", cone.sine);
+  });
+}
+NodeProgram record_part() {
+  return recorded([](Program& p) {
+    LampCone<Expr> cone;
+    cone.towards = input3("towards");
+    cone.sine = Expr::input("sine");
+    const LampPart<Expr> part =
+        part_of_strip(slot_input(), axes_input(), cone, input3("at"), Expr::input("index"), input3("normal"));
+    p.output("part", part.towards);
+    p.output("clear", part.clear);
   });
 }
 NodeProgram record_flat() {
@@ -111,10 +129,10 @@ NodeProgram record_lobe() {
     cone.chord = Expr::input("chord");
     cone.flat = Expr::input("flat");
     cone.solid_angle = Expr::input("solid_angle");
-    cone.whole = Expr::input("whole");
+    cone.clear = Expr::input("clear");
     const Expr emphasis = select(cone.flat > Expr(0.5), Expr::input("emphasis"), Expr(1.0));
-    const ToonLobe<Expr> lobe = toon_lobe(cone, emphasis, Expr::input("density"), Expr::input("room"),
-                                          Rgb<Expr>::input("value"), Expr::input("u_2"));
+    const ToonLobe<Expr> lobe = toon_lobe(Expr::input("parts"), cone, emphasis, Expr::input("density"),
+                                          Expr::input("room"), Rgb<Expr>::input("value"), Expr::input("u_2"));
     p.output("color", lobe.color);
     p.output("size", lobe.size);
   });

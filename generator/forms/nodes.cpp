@@ -281,6 +281,7 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
   if (lamps) {
     add("axes", record_axes());
     add("cone", record_cone());
+    add("part", record_part());
     add("flat", record_flat());
     add("met", record_met());
     add("lobe", record_lobe());

@@ -112,8 +112,10 @@ Edge sharpest_edge(const BoundModel& bound, int arcs, Random& random) {
       for (double h = 2 * reach / kCoarse; h > kFinest; h = 2 * h / kFine) k = kinks(k.at - h, k.at + h, kFine)[0];
       if (k.jump > sharpest.jump) sharpest = k;
     }
+    // Numbers below that have few digits, and their differences jump.
+    constexpr double kDark = 1e-290;
     const double scale = std::max(height, steepest);
-    const double jump = scale > 0 ? sharpest.jump / scale : 0;
+    const double jump = scale > kDark ? sharpest.jump / scale : 0;
     if (jump > worst.jump)
       worst = {jump, fmt::format("{} wi={} wo={}", bound.label, text(at(wi, ti, sharpest.at)),
                                  text(at(wo, to, sharpest.at)))};

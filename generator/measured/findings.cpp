@@ -6,6 +6,7 @@
 
 #include "core/parallel.h"
 #include "core/sequence.h"
+#include "core/text.h"
 
 namespace brdfc::measured {
 namespace {
@@ -42,8 +43,8 @@ Findings findings(const Measurement& m, const MeasuredModel& model, const std::v
     out.sentences.push_back(
         fmt::format("nothing was measured beyond {:g} degrees to the normal: what is there holds beyond", m.highest));
   if (out.non_reciprocal > kVisible)
-    out.sentences.push_back(
-        fmt::format("not reciprocal: light and view swapped, {:.2g} % of the light differs", 100 * out.non_reciprocal));
+    out.sentences.push_back(fmt::format("not reciprocal: light and view swapped, {} % of the light differs",
+                                        in_percent(out.non_reciprocal)));
   const auto brightest =
       std::ranges::max_element(out.views, {}, [](const Findings::View& v) { return max_component(v.albedo); });
   if (max_component(brightest->albedo) > 1 + kVisible)

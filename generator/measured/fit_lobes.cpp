@@ -41,8 +41,6 @@ constexpr double kNothing = 1e-4;
 constexpr double kNoLight = 1e-4;
 /// Keeping within the light that comes may make the error so much larger, and by this part of the light.
 constexpr double kWorthBound = 1.1, kCheap = 1e-3;
-constexpr std::array<double, 8> kAlbedoViews{0, 15, 30, 45, 60, 75, 85, 89};
-constexpr int kAlbedoSamples = 1024, kAlbedoAzimuths = 8;
 
 /// Pairs as matrices, a column for each channel.
 struct Target {
@@ -185,11 +183,7 @@ class Fitter {
     }
     places = std::move(kept);
     if (out.lobes.empty()) return out;
-    const auto sum = SumModel(out.lobes).make_double({});
-    for (const double degrees : kAlbedoViews) {
-      const double a = albedo(*sum, degrees).maxCoeff();
-      if (a > out.brightest) out.brightest = a, out.brightest_at = degrees;
-    }
+    out.brightest = brightest_view(*SumModel(out.lobes).make_double({}), isotropic_);
     return out;
   }
 
@@ -327,17 +321,9 @@ class Fitter {
         ->places;
   }
 
-  /// The albedo from one view, over all its azimuths.
   Eigen::RowVector3d albedo(const Brdf<double>& brdf, double degrees) const {
-    const double cos_o = std::cos(degrees * kPi / 180);
-    Sequence3 points(std::uint64_t(degrees) + 1);
-    Rgb<double> sum(0);
-    for (int k = 0; k < kAlbedoSamples; ++k) {
-      const double turn = isotropic_ ? 0 : 2 * kPi * (k % kAlbedoAzimuths) / kAlbedoAzimuths;
-      const Sample<double> s = brdf.sample(direction(cos_o, turn), points.next());
-      if (s.pdf > 0) sum += s.weight / double(kAlbedoSamples);
-    }
-    return {sum.r, sum.g, sum.b};
+    const Rgb<double> a = view_albedo(brdf, isotropic_, degrees);
+    return {a.r, a.g, a.b};
   }
 
   /// Finds colours with which no view reflects more light than comes, if that costs little.

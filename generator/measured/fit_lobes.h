@@ -10,6 +10,7 @@
 
 #include <functional>
 
+#include "measured/brightest.h"
 #include "measured/lobe_kinds.h"
 #include "measured/measured_model.h"
 #include "measured/sum_model.h"
@@ -20,8 +21,7 @@ struct LobeSum {
   std::vector<Lobe> lobes;    ///< those that reflect most light first
   std::vector<double> share;  ///< of the light of the sum, by lobe
   double error = 0;           ///< share of the light that is misplaced
-  /// The largest albedo of all views that were tried, and where, in degrees to the normal.
-  double brightest = 0, brightest_at = 0;
+  Brightest brightest;
   double seconds = 0;  ///< since the fit of sums began
 };
 
@@ -32,8 +32,5 @@ struct LobeSum {
 std::vector<LobeSum> fit_lobes(const Measurement&, const MeasuredModel&, const std::vector<LobeKind>&, std::size_t most,
                                const std::function<void(std::size_t)>& progress = {});
 inline constexpr std::size_t lobe_steps(std::size_t most) { return 2 * most; }
-
-/// The largest number of lobes that can be asked for.
-inline constexpr int kMostLobes = 12;
 
 }  // namespace brdfc::measured

@@ -286,6 +286,21 @@ ParamValues rounded(ParamValues values) {
   return values;
 }
 
+std::optional<std::string> order_of_fits(const std::vector<ModelFit>& fits) {
+  // Errors as they are printed.
+  const auto percent = [](double share) { return std::lround(share * 1e4); };
+  bool mirrors = false, parameters = false;
+  for (std::size_t i = 0; i < fits.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k)
+      if (percent(fits[i].error) < percent(fits[k].error))
+        (has_mirror(fits[i]) && distance(fits[i]) > distance(fits[k]) ? mirrors : parameters) = true;
+  std::vector<const char*> why;
+  if (mirrors) why.push_back("the order counts the light of a mirror as misplaced, which the column does not");
+  if (parameters) why.push_back("of models that come about as close, those with fewer parameters stand first");
+  if (why.empty()) return std::nullopt;
+  return fmt::to_string(fmt::join(why, "; "));
+}
+
 std::vector<ModelFit> fit_models(const Measurement& m, const MeasuredModel& data,
                                  const std::vector<const Model*>& models, Matte matte,
                                  const std::function<void(const Model&, std::size_t done)>& progress) {

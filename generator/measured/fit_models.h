@@ -9,6 +9,7 @@
 
 #include <functional>
 #include <optional>
+#include <string>
 
 #include "measured/measured_model.h"
 
@@ -27,8 +28,14 @@ struct ModelFit {
   double seconds = 0;
 };
 
+/// Whether a fitted model has a mirror whose light is worth a word: less than 0.005 % is not.
+inline bool has_mirror(const ModelFit& f) { return f.mirror >= 5e-5; }
+
 /// The values to four digits, for people: a measurement has no more.
 ParamValues rounded(ParamValues);
+
+/// Why fits stand before ones with smaller errors, in a sentence; nullopt if none does.
+std::optional<std::string> order_of_fits(const std::vector<ModelFit>&);
 
 /// Whether light of a Lambert surface may be added to the models.
 enum class Matte { None, Added };

@@ -11,12 +11,11 @@ namespace brdfc::measured {
 
 /// Tabulates how bright half vectors are on average over difference angles, and samples these. Near normal incidence
 /// the pdf is close to f cos; at other views it is a good guess, and the cosine lobe covers what it misses.
-class HalfVectors {
+class HalfVectors final : public Sampler {
  public:
   HalfVectors(const Table&, bool isotropic);
-  double pdf(const Vec3<double>& wi, const Vec3<double>& wo) const;
-  /// A direction and its pdf; the weight is left at 0. `u` is as in Brdf::sample().
-  Sample<double> sample(const Vec3<double>& wo, const Vec3<double>& u) const;
+  double pdf(const Vec3<double>& wi, const Vec3<double>& wo) const override;
+  Sample<double> sample(const Vec3<double>& wo, const Vec3<double>& u) const override;
   double matte_share() const { return matte_; }
 
  private:

@@ -5,6 +5,7 @@
 #include <cctype>
 
 #include "core/error.h"
+#include "measured/alta.h"
 #include "measured/csv_grid.h"
 #include "measured/merl.h"
 #include "measured/rgl.h"
@@ -12,15 +13,34 @@
 
 namespace brdfc::measured {
 
-Measurement read_measurement(const std::filesystem::path& path, const ToRgb& to_rgb) {
+namespace {
+
+Measurement read(const std::filesystem::path& path, const ToRgb& to_rgb) {
   std::string extension = path.extension().string();
   std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
   if (extension == ".binary") return read_merl(path);
   if (extension == ".bsdf") return read_rgl(path, to_rgb);
   if (extension == ".bin") return read_utia(path);
+  if (extension == ".alta" || extension == ".dat") return read_alta(path);
   if (extension == ".csv") return read_csv_grid(path);
-  input_error("{}: expected a name that ends with one of {}: MERL, RGL, UTIA or a table", path.string(),
+  input_error("{}: expected a name that ends with one of {}: MERL, RGL, UTIA, ALTA or a table", path.string(),
               fmt::join(kExtensions, ", "));
+}
+
+}  // namespace
+
+Measurement read_measurement(const std::filesystem::path& path, const ToRgb& to_rgb) {
+  Measurement m = read(path, to_rgb);
+  if (!(m.largest > 0)) input_error("{}: expected a number above 0, found none: the data are black", m.file);
+  return m;
+}
+
+double largest(const std::vector<std::array<float, 3>>& values) {
+  double out = 0;
+  for (const auto& value : values)
+    for (const float v : value)
+      if (v > out) out = v;
+  return out;
 }
 
 std::string counted(std::size_t count, const std::string& one, const std::string& many) {

@@ -6,6 +6,7 @@
 //   RGL .bsdf       J. Dupuy, W. Jakob: An Adaptive Parameterization for Efficient Material Acquisition and Rendering,
 //                   SIGGRAPH Asia 2018
 //   UTIA .bin       J. Filip, R. Vavra: Template-Based Sampling of Anisotropic BRDFs, Pacific Graphics 2014
+//   ALTA .alta .dat text of the BRDF library ALTA (measured/alta.h)
 //   CSV             a value for every combination of angles (measured/csv_grid.h)
 #pragma once
 
@@ -16,9 +17,19 @@
 #include <vector>
 
 #include "core/vec.h"
+#include "model/model.h"
 #include "model/optical.h"
 
 namespace brdfc::measured {
+
+/// Importance sampling of a table.
+class Sampler {
+ public:
+  virtual ~Sampler() = default;
+  virtual double pdf(const Vec3<double>& wi, const Vec3<double>& wo) const = 0;
+  /// A direction and its pdf; the weight is left at 0. `u` is as in Brdf::sample().
+  virtual Sample<double> sample(const Vec3<double>& wo, const Vec3<double>& u) const = 0;
+};
 
 /// The values of a file. Directions and units are those of a model (model/model.h).
 class Table {
@@ -26,15 +37,18 @@ class Table {
   virtual ~Table() = default;
   /// The BRDF in 1/sr, in linear Rec.709; 0 unless both directions are above the surface. Finite and not negative.
   virtual Rgb<double> eval(const Vec3<double>& wi, const Vec3<double>& wo) const = 0;
+  /// What the file's own tables tell of where light goes, if they do.
+  virtual std::shared_ptr<const Sampler> sampler() const { return nullptr; }
 };
 
 struct Measurement {
   std::string file;
-  std::string format;              ///< "MERL", "RGL", "UTIA" or "CSV"
+  std::string format;              ///< "MERL", "RGL", "UTIA", "ALTA" or "CSV"
   std::string description;         ///< text that the file has about itself, if any
   std::string grid;                ///< resolution, for people
   bool isotropic = true;           ///< unchanged when both directions are rotated about the normal
   double highest = 90;             ///< largest angle to the normal that was measured, in degrees
+  double largest = 0;              ///< of the numbers that it was made of
   std::vector<std::string> notes;  ///< a sentence for each thing that was assumed, left out or repaired
   std::shared_ptr<const Table> table;
 };
@@ -43,9 +57,12 @@ struct Measurement {
 /// to linear Rec.709. Throws InputError that names the file, the field or line, and what was expected.
 Measurement read_measurement(const std::filesystem::path&, const ToRgb& to_rgb);
 /// The extensions that read_measurement() knows.
-inline constexpr std::array<const char*, 4> kExtensions{".binary", ".bsdf", ".bin", ".csv"};
+inline constexpr std::array<const char*, 6> kExtensions{".binary", ".bsdf", ".bin", ".alta", ".dat", ".csv"};
 
 /// "1 entry is" or "12 entries are"
 std::string counted(std::size_t count, const std::string& one, const std::string& many);
+
+/// The largest number of all channels, without NaN.
+double largest(const std::vector<std::array<float, 3>>& values);
 
 }  // namespace brdfc::measured

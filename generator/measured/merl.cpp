@@ -5,7 +5,9 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "measured/binary_file.h"
+#include "measured/gaps.h"
 
 namespace brdfc::measured {
 namespace {
@@ -67,6 +69,16 @@ class Merl final : public Table {
  private:
   std::vector<std::array<float, 3>> values_;
 };
+
+/// Fills what was not measured above the horizon.
+void fill(std::vector<std::array<float, 3>>& values, const std::vector<bool>& above) {
+  // In units of cells, between which the table is linear. phi_d is stretched to a circle, so that its ends meet.
+  AngleAxis h, d, p{{}, AngleAxis::Ends::Circle};
+  for (std::size_t k = 0; k < kMerlThetaH; ++k) h.at.push_back(double(k));
+  for (std::size_t k = 0; k < kMerlThetaD; ++k) d.at.push_back(double(k));
+  for (std::size_t k = 0; k < kMerlPhiD; ++k) p.at.push_back(double(k) * 360 / double(kMerlPhiD));
+  fill_gaps(values, std::array<const AngleAxis*, 3>{&h, &d, &p}, std::array<std::size_t, 3>{1, 2, 0}, above);
+}
 
 bool above_horizon(std::size_t entry) {
   const auto [wi, wo] = directions(merl_angles(entry));
@@ -132,27 +144,31 @@ Measurement read_merl(const std::filesystem::path& path) {
     }
   }
   std::size_t above = 0, holes = 0, clipped = 0;
+  std::vector<bool> is_above(kMerlEntries);
   for (std::size_t i = 0; i < kMerlEntries; ++i) {
     const bool dark = values[i][0] == 0 && values[i][1] == 0 && values[i][2] == 0, inside = above_horizon(i);
     // Noise takes single channels below 0; what was not measured is negative in all.
     const bool hole = negative[i] == 3 || (dark && !inside);
     above += inside;
+    is_above[i] = inside;
     holes += inside && hole;
     clipped += inside && !hole && negative[i] > 0;
     if (hole) values[i].fill(NAN);
   }
   if (holes == above) input_error("{}: expected values above the horizon, found none", file.name());
-  if (holes)
-    out.notes.push_back(
-        fmt::format("{} of {} above the horizon are negative, {:.2g} %: not measured, filled from cells "
-                    "beside them",
-                    counted(holes, "entry", "entries"), above, 100 * double(holes) / double(above)));
+  if (holes) {
+    fill(values, is_above);
+    out.notes.push_back(fmt::format("{} of {} above the horizon are negative, {} %: not measured, {}",
+                                    counted(holes, "entry", "entries"), above,
+                                    in_percent(double(holes) / double(above)), kFilled));
+  }
   if (clipped)
     out.notes.push_back(fmt::format("{} negative in one channel or two: taken for 0 there",
                                     counted(clipped, "entry is", "entries are")));
   out.file = file.name();
   out.format = "MERL";
   out.grid = fmt::format("{} x {} x {} cells of theta_h, theta_d and phi_d", kMerlThetaH, kMerlThetaD, kMerlPhiD);
+  out.largest = largest(values);
   out.table = std::make_shared<Merl>(std::move(values));
   return out;
 }

@@ -7,7 +7,8 @@
 // which reciprocity allows. W. Matusik's reading code defines all of it.
 //
 // An entry is taken for the value in the middle of its cell, and values in between are interpolated. An entry that is
-// negative, or that is 0 in a cell whose middle is below the horizon, was not measured; its neighbours speak for it.
+// negative, or that is 0 in a cell whose middle is below the horizon, was not measured. Those above the horizon are
+// filled (measured/gaps.h).
 #pragma once
 
 #include <array>

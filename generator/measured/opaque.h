@@ -2,6 +2,8 @@
 // What a BRDF is that lets no light through and has no formula: no ideal refraction, closures or colours to assign.
 #pragma once
 
+#include <stdexcept>
+
 #include "model/model.h"
 
 namespace brdfc::measured {
@@ -25,6 +27,27 @@ class OpaquePacked : public PackedBrdf {
   Pack ior() const override { return Pack(1); }
   std::array<Pack, 3> channel_iors() const override { return {Pack(1), Pack(1), Pack(1)}; }
   void assign(const std::string&, const std::array<Pack, 3>&) override {}
+};
+
+/// A model without parameters in the place of one that is registered, for renderers and quadrature: it takes double
+/// precision alone, and there is no formula to record.
+class OpaqueModel : public Model {
+ public:
+  explicit OpaqueModel(ModelInfo info) : info_(std::move(info)) {}
+  const ModelInfo& info() const override { return info_; }
+  bool has_exact() const override { return false; }
+  /// Throws std::logic_error, as the two below.
+  std::unique_ptr<Brdf<float>> make_float(const ParamValues&) const override { no_formula(); }
+  std::unique_ptr<Brdf<Wide>> make_wide(const ParamValues&) const override { no_formula(); }
+  std::unique_ptr<Brdf<Expr>> record(const ParamValues&) const override { no_formula(); }
+
+ protected:
+  ModelInfo info_;
+
+ private:
+  [[noreturn]] void no_formula() const {
+    throw std::logic_error(fmt::format("the model '{}' has no formula of its own", info_.name));
+  }
 };
 
 }  // namespace brdfc::measured

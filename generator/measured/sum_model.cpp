@@ -2,10 +2,8 @@
 #include "measured/sum_model.h"
 
 #include <algorithm>
-#include <stdexcept>
 
 #include "core/sequence.h"
-#include "measured/opaque.h"
 #include "model/sampling.h"
 
 namespace brdfc::measured {
@@ -131,8 +129,6 @@ Terms<Brdf<double>> terms_of(const std::vector<Lobe>& lobes) {
   return out;
 }
 
-[[noreturn]] void no_own_formula() { throw std::logic_error("a sum of models has no formula of its own"); }
-
 }  // namespace
 
 SumModel::Shares::Shares(const std::vector<std::unique_ptr<Brdf<double>>>& terms)
@@ -163,7 +159,7 @@ const std::vector<double>& SumModel::Shares::at(double cosTheta_o) const {
 }
 
 SumModel::SumModel(std::vector<Lobe> lobes)
-    : info_{.name = "sum", .label = "Sum", .look = Look::Matte}, lobes_(std::move(lobes)) {
+    : OpaqueModel({.name = "sum", .label = "Sum", .look = Look::Matte}), lobes_(std::move(lobes)) {
   std::vector<std::string> names;
   for (const Lobe& lobe : lobes_) {
     const ModelInfo& each = lobe.model->info();
@@ -192,8 +188,5 @@ std::unique_ptr<PackedBrdf> SumModel::make_packed(const ParamValues&) const {
   for (const Lobe& lobe : lobes_) terms.push_back(lobe.model->make_packed(lobe.values));
   return std::make_unique<PackedSum>(std::move(terms), shares_);
 }
-std::unique_ptr<Brdf<float>> SumModel::make_float(const ParamValues&) const { no_own_formula(); }
-std::unique_ptr<Brdf<Wide>> SumModel::make_wide(const ParamValues&) const { no_own_formula(); }
-std::unique_ptr<Brdf<Expr>> SumModel::record(const ParamValues&) const { no_own_formula(); }
 
 }  // namespace brdfc::measured

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "model/model.h"
+#include "measured/opaque.h"
 
 namespace brdfc::measured {
 
@@ -16,22 +16,15 @@ struct Lobe {
   ParamValues values;
 };
 
-/// A model without parameters that adds others up. Sampling chooses a lobe by its albedo for the view, and the pdf is
-/// that of all. It is not registered, and takes double precision alone.
-class SumModel final : public Model {
+/// Adds others up. Sampling chooses a lobe by its albedo for the view, and the pdf is that of all.
+class SumModel final : public OpaqueModel {
  public:
   /// `lobes` are of models that let no light through.
   explicit SumModel(std::vector<Lobe> lobes);
-  const ModelInfo& info() const override { return info_; }
   bool has_scatter() const override;
   bool has_mirror() const override;
-  bool has_exact() const override { return false; }
   std::unique_ptr<Brdf<double>> make_double(const ParamValues&) const override;
   std::unique_ptr<PackedBrdf> make_packed(const ParamValues&) const override;
-  /// Throws std::logic_error, as the two below.
-  std::unique_ptr<Brdf<float>> make_float(const ParamValues&) const override;
-  std::unique_ptr<Brdf<Wide>> make_wide(const ParamValues&) const override;
-  std::unique_ptr<Brdf<Expr>> record(const ParamValues&) const override;
 
   const std::vector<Lobe>& lobes() const { return lobes_; }
 
@@ -47,7 +40,6 @@ class SumModel final : public Model {
   };
 
  private:
-  ModelInfo info_;
   std::vector<Lobe> lobes_;
   std::shared_ptr<const Shares> shares_;
 };

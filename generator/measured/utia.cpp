@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "measured/binary_file.h"
 #include "measured/grid_table.h"
 
@@ -39,13 +40,14 @@ Measurement read_utia(const std::filesystem::path& path) {
   }
   Measurement out;
   if (negative)
-    out.notes.push_back(fmt::format("{} negative, {:.2g} %: taken for 0", counted(negative, "number is", "numbers are"),
-                                    100 * double(negative) / double(3 * kEntries)));
+    out.notes.push_back(fmt::format("{} negative, {} %: taken for 0", counted(negative, "number is", "numbers are"),
+                                    in_percent(double(negative) / double(3 * kEntries))));
   out.file = file.name();
   out.format = "UTIA";
   out.grid = fmt::format("{0} x {1} directions of light, {0} x {1} of view", kThetas, kPhis);
   out.isotropic = false;
   out.highest = kThetaStep * double(kThetas - 1);
+  out.largest = largest(table->values);
   out.table = std::move(table);
   return out;
 }

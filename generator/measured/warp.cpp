@@ -2,6 +2,7 @@
 #include "measured/warp.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace brdfc::measured {
 namespace {
@@ -20,6 +21,13 @@ Interval interval(const std::vector<float>& at, double x) {
 }
 
 double mix(double a, double b, double weight) { return a * (1 - weight) + b * weight; }
+
+/// Where, from 0 to 1, the integral of a function that is linear from a to b over an interval of length `width` is
+/// `sum`.
+double inverse_integral(double a, double b, double sum, double width) {
+  const double target = 2 * std::max(sum, 0.) / width, root = a + std::sqrt(std::max(a * a + (b - a) * target, 0.));
+  return root > 0 ? std::min(target / root, 1.) : 0.5;
+}
 
 /// The integral from 0 to u of a function that is linear from a to b, over an interval of length `width`.
 double integral(double a, double b, double u, double width) { return u * mix(a, b, 0.5 * u) * width; }
@@ -118,6 +126,31 @@ Point2 Warp::invert(const Point2& at, const Blend& b) const {
   if (c.y > 0) y += column_sum(c.y - 1, b);
   // A row without any value is mapped to nothing; the middle is as good as any place in it.
   return {whole > 0 ? x / whole : 0.5, y};
+}
+
+Point2 Warp::sample(const Point2& u, const Blend& b) const {
+  // The first of `count` sums that is larger than a number; the last one if none is.
+  const auto find = [](std::size_t count, double number, const auto& sum) {
+    std::size_t first = 0;
+    while (count > 1) {
+      const std::size_t half = count / 2;
+      if (sum(first + half - 1) > number)
+        count = half;
+      else
+        first += half, count -= half;
+    }
+    return first;
+  };
+  const std::size_t y = find(height_ - 1, u.y, [&](std::size_t k) { return column_sum(k, b); });
+  const double low = row_sum(width_ - 2, y, b), high = row_sum(width_ - 2, y + 1, b);
+  const double v = inverse_integral(low, high, u.y - (y > 0 ? column_sum(y - 1, b) : 0), 1 / double(height_ - 1));
+  const auto in_row = [&](std::size_t k) { return mix(row_sum(k, y, b), row_sum(k, y + 1, b), v); };
+  const double target = u.x * in_row(width_ - 2);
+  const std::size_t x = find(width_ - 1, target, in_row);
+  const double left = mix(value(x, y, b), value(x, y + 1, b), v),
+               right = mix(value(x + 1, y, b), value(x + 1, y + 1, b), v);
+  const double along = inverse_integral(left, right, target - (x > 0 ? in_row(x - 1) : 0), 1 / double(width_ - 1));
+  return {(double(x) + along) / double(width_ - 1), (double(y) + v) / double(height_ - 1)};
 }
 
 }  // namespace brdfc::measured

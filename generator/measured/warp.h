@@ -32,6 +32,8 @@ class Warp {
   double eval(const Point2& at, const Blend&) const;
   /// The place in the square of uniform numbers that is mapped to `at`.
   Point2 invert(const Point2& at, const Blend&) const;
+  /// The place to which a uniform number is mapped; its density is that of eval().
+  Point2 sample(const Point2& u, const Blend&) const;
 
  private:
   struct Cell {

@@ -146,6 +146,10 @@ class Model {
   virtual std::unique_ptr<Brdf<Expr>> record(const ParamValues& fixed) const = 0;
 };
 
+/// The largest number of lobes in a material that adds models up: with more, renders take longer, and the errors of
+/// fitted sums hardly fall. A fitted sum has at most the second number unless another one is asked for.
+inline constexpr int kMostLobes = 12, kFittedLobes = 4;
+
 /// Throws InputError naming the model if parameters() omits a member, which would be uninitialised.
 void require_bound(const Model&);
 

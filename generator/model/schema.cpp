@@ -180,6 +180,11 @@ double table_error(const ModelInfo& info, const ParamValues& given) {
   return std::get<std::string>(complete(info, given).at(t.parameter)) == t.choice ? t.error : 0;
 }
 
+bool is_compensated(const ModelInfo& info, const ParamValues& given) {
+  const CompensatedChoice& c = info.properties.compensated;
+  return !c.choice.empty() && std::get<std::string>(complete(info, given).at(c.parameter)) == c.choice;
+}
+
 std::string format_values(const ModelInfo& info, const ParamValues& values) {
   std::string text;
   for (const ParamInfo& p : info.params) {

@@ -63,6 +63,11 @@ struct TabulatedChoice {
   double error = 0;  ///< largest deviation of the albedo from its claim due to interpolation; 0: no such choice
 };
 
+/// A choice whose factor for interreflection depends on the viewer alone.
+struct CompensatedChoice {
+  std::string parameter, choice;
+};
+
 /// Claims of the paper or of this project about a model. Tests try to prove each claim, also the negative ones.
 struct ModelProperties {
   bool reciprocal = true;      ///< f(wi, wo) = f(wo, wi)
@@ -78,6 +83,7 @@ struct ModelProperties {
   /// Assignments ("n=1e8") for which nearly all light is reflected in the mirror direction; "" if there are none.
   std::string specular_limit = "";
   TabulatedChoice tabulated = {};
+  CompensatedChoice compensated = {};  ///< `reciprocal` and `conserving` do not apply to it
   /// False if no table can hold the albedo, because the model has too many parameters, or because the albedo is not a
   /// polynomial of degree two in a colour. There is no Albedo output then.
   bool albedo_table = true;
@@ -116,6 +122,8 @@ ParamValues complete(const ModelInfo&, const ParamValues&);
 ParamValues parse_values(const ModelInfo&, const std::vector<std::string>& assignments);
 /// The error that the model declares for a tabulated choice; 0 if these values do not select it.
 double table_error(const ModelInfo&, const ParamValues&);
+/// Whether these values select the model's compensated choice.
+bool is_compensated(const ModelInfo&, const ParamValues&);
 /// The values as text in the syntax of parse_values(), with parameters in schema order.
 std::string format_values(const ModelInfo&, const ParamValues&);
 

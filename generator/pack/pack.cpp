@@ -221,6 +221,7 @@ Result build_pack(const Options& options) {
                    {"hash", ""},
                    {"closure_pool", {{"bytes", kPoolBytes}, {"mix", 3 * kPoolNode}, {"add", kPoolNode}}},
                    {"closure_slots", {{"most", kMaxClosures}, {"lamp", slots(ClosureKind::PhongRamp)}}},
+                   {"lobes", {{"most", kMostLobes}, {"fitted", kFittedLobes}}},
                    {"looks", looks_json()},
                    {"models", Json::object()}};
   for (std::size_t i = 0; i < chosen.size(); ++i) {

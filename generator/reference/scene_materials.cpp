@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "core/hash.h"
+#include "core/text.h"
 #include "measured/fit_lobes.h"
 #include "measured/fit_models.h"
 #include "model/optical.h"
@@ -122,8 +123,8 @@ class MaterialReader {
       if (!model->two_sided()) names.push_back(name);
     std::vector<measured::Lobe> lobes;
     const JsonView list = m.at("sum");
-    if (!list.json().is_array() || list.json().empty() || list.json().size() > measured::kMostLobes)
-      list.fail(fmt::format("1 to {} lobes", measured::kMostLobes));
+    if (!list.json().is_array() || list.json().empty() || list.json().size() > kMostLobes)
+      list.fail(fmt::format("1 to {} lobes", kMostLobes));
     for (const JsonView& each : list.elements()) {
       each.only({"model", "parameters"});
       measured::Lobe lobe{&find_model(each.at("model").choice(names)), {}};
@@ -139,6 +140,10 @@ class MaterialReader {
       lobes.push_back(std::move(lobe));
     }
     set_sum(std::move(lobes), material, resolved);
+    const auto brdf = material.model->make_double({});
+    if (const auto said =
+            measured::gain_of_sum(measured::brightest_view(*brdf, material.model->info().properties.isotropic)))
+      files_.note(fmt::format("{}: {}", list.key(), *said));
   }
 
   static void set_sum(std::vector<measured::Lobe> lobes, Material& material, json& resolved) {
@@ -201,12 +206,12 @@ class MaterialReader {
     }
     const auto misplaces = [&](const std::string& what, double error, const std::string& values) {
       files_.note(
-          fmt::format("{}: {} misplaces {:.2g} % of the light: {}", measurement.file, what, 100 * error, values));
+          fmt::format("{}: {} misplaces {} % of the light: {}", measurement.file, what, in_percent(error), values));
     };
     if (name == "lobes") {
       const auto most = m.find("lobes");
       const auto sums = measured::fit_lobes(measurement, *table, measured::lobe_kinds({}, measurement.isotropic),
-                                            most ? std::size_t(most->integer(1, measured::kMostLobes)) : 4);
+                                            most ? std::size_t(most->integer(1, kMostLobes)) : kFittedLobes);
       if (sums.empty()) as->error("is a sum of nothing: the data are black");
       const measured::LobeSum& sum = sums.back();
       std::vector<std::string> each;
@@ -214,9 +219,7 @@ class MaterialReader {
         each.push_back(lobe.model->info().name + " " + described(lobe.model->info(), lobe.values));
       misplaces("a sum of " + measured::counted(sum.lobes.size(), "lobe", "lobes"), sum.error,
                 fmt::format("{}", fmt::join(each, " + ")));
-      if (sum.brightest > 1.005)
-        files_.note(fmt::format("{}: the sum reflects more light than it gets: {:.3g} times seen at {:g} degrees",
-                                measurement.file, sum.brightest, sum.brightest_at));
+      if (const auto said = measured::gain_of_sum(sum.brightest)) files_.note(measurement.file + ": " + *said);
       set_sum(sum.lobes, material, resolved);
       return;
     }
@@ -225,9 +228,9 @@ class MaterialReader {
     if (fits.empty()) as->error("lets light through, which no measured BRDF shows: expected another model");
     const measured::ModelFit& fit = fits.front();
     const ModelInfo& info = fit.model->info();
-    if (fit.mirror > 0)
-      files_.note(fmt::format("{}: {} has a mirror, {:.2g} % of a white world, which is not in the data",
-                              measurement.file, info.name, 100 * fit.mirror));
+    if (measured::has_mirror(fit))
+      files_.note(fmt::format("{}: {} has a mirror, {} % of a white world, which is not in the data", measurement.file,
+                              info.name, in_percent(fit.mirror)));
     if (fit.matte) {
       const Model& lambert = find_model("lambert");
       const ParamValues rho{{"rho", std::array<double, 3>{fit.matte->r, fit.matte->g, fit.matte->b}}};

@@ -63,6 +63,14 @@ def tool(answers):
     return run
 
 
+@pytest.fixture(scope="module")
+def by_the_tool(program):
+    """The extension calls the tool itself, whose answers are not kept."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("BRDFC_TOOL", str(program))
+        yield
+
+
 @pytest.fixture(scope="session")
 def kept_program(program, answers, tmp_path_factory):
     """A program that answers like the tool, which computes each answer only once."""
@@ -100,6 +108,7 @@ def extension(extension_zip):
     assert PACKAGE in bpy.context.preferences.addons
     modules = (
         "api",
+        "common.files",
         "content.group_content",
         "groups.nodes",
         "lean",

@@ -217,7 +217,7 @@ def test_shaders_are_short(extension_zip, subtests):
                 print(f"{name}: {operations} operations, {found} statements")
                 longer = {"lossless_aimed": 2900, "factors_aimed": 2300, "factors_sampled": 900}
                 most = next((m for part, m in longer.items() if part in name), None)
-                most = most or (1400 if "_aimed" in name else 600)
+                most = most or (1450 if "_aimed" in name else 600)
                 assert operations < most
                 assert 0 < found < most
 
@@ -712,6 +712,7 @@ def test_only_choices_leave_parameters_unread(extension):
     proportion = {"proportion": ["custom"]}
     assert needs == {
         ("ashikhmin_shirley", "rd"): {"part": ["both", "diffuse"]},
+        ("microfacet", "again"): {"distribution": ["multiscatter_ggx"]},
         **drawn,
         ("radziszewski_alda", "n"): {"proportion": ["paper", "equal"]},
         ("radziszewski_alda", "n_theta"): proportion | {"part": ["product", "latitudinal"]},

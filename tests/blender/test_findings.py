@@ -341,6 +341,22 @@ def test_small_lamps_in_an_ideal_mirror(extension, empty):
         assert found(extension, mirror, empty) == {}
 
 
+def test_sheared_area_lamps(extension, empty):
+    material = extension.api.new_material("ward", "nodes")
+    helpers.add_sphere(empty, material)
+    lamp = helpers.add_lamp(empty, "AREA", "Lamp", (0, -2, 3), (0.5, 0.3, 0))
+    lamp.parent = bpy.data.objects.new("Parent", None)
+    empty.collection.objects.link(lamp.parent)
+    for scale, codes in (((1, 1, 1), []), ((2, 1, 1), ["sheared_lamps"]), ((2, 2, 2), [])):
+        lamp.parent.scale = scale
+        bpy.context.view_layer.update()
+        assert [c for c in found(extension, material, empty) if c == "sheared_lamps"] == codes
+    lamp.parent.scale = (2, 1, 1)
+    bpy.context.view_layer.update()
+    aimed = extension.api.new_material("ward", "aimed")
+    assert "sheared_lamps" not in found(extension, aimed, empty)
+
+
 @pytest.mark.parametrize("rays", ["visible_diffuse", "visible_glossy"])
 def test_ray_visibility_of_lamps(extension, empty, rays):
     material = ball(extension, empty)

@@ -55,7 +55,21 @@ def add_lamp(scene, kind, name=None, location=(0, 0, 4), turn=(0.3, -0.5, 0.9), 
 
 
 def slots(scene, update=True):
-    """The twelve numbers of each filled slot, as Cycles gets them from the evaluated group."""
+    """The twelve numbers of each filled slot, as Cycles gets them from the evaluated group, without
+    what codes() returns."""
+    found = coded_slots(scene, update)
+    for slot in found:
+        slot[9] %= 8
+    return found
+
+
+def codes(scene):
+    """[(number of parts, number of the plane)] of the filled slots."""
+    found = [int(slot[9] // 8) for slot in coded_slots(scene)]
+    return [(code % 8 + 1, code // 8) for code in found]
+
+
+def coded_slots(scene, update=True):
     layer = scene.view_layers[0]
     if update:
         layer.update()
@@ -160,6 +174,63 @@ def test_every_type_of_lamp(ball, empty, subtests):
                 assert_lamp(slot, lamp)
             bpy.data.objects.remove(lamp)
             assert slots(empty) == []
+
+
+def test_parts_of_long_lamps(extension, ball, empty, monkeypatch):
+    """A rectangle has as many as its long side has of its short one, up to four, and as a
+    material's closures have room for."""
+    lamp = add_lamp(empty, "AREA", shape="RECTANGLE", size=1.0, size_y=0.1)
+    assert codes(empty) == [(4, 0)]
+    (slot,) = slots(empty)
+    assert_lamp(slot, lamp)
+    for size, parts in ((0.1, 1), (0.14, 1), (0.2, 2), (0.3, 3)):
+        lamp.data.size = size
+        assert codes(empty) == [(parts, 0)], size
+    lamp.scale.x = 3.0
+    extension.api.see_lamps(empty)
+    assert codes(empty) == [(4, 0)]
+    lamp.data.shape = "ELLIPSE"
+    assert codes(empty) == [(1, 0)]
+    lamp.data.shape = "RECTANGLE"
+    faint = add_lamp(empty, "AREA", "Faint", (5, 0, 9), shape="RECTANGLE", size=1.0, size_y=0.1)
+    faint.data.energy = 0.01
+    filling = import_module(f"{extension.package}.lamps.filling")
+    monkeypatch.setattr(filling, "_room", lambda _: (5, None))
+    extension.api.see_lamps(empty)
+    assert sorted(codes(empty)) == [(1, 0), (4, 0)]
+    # Shaders of another version would take these numbers for other kinds of lamps.
+    update = import_module(f"{extension.package}.groups.update")
+    monkeypatch.setattr(update, "others", lambda: [(None, None)])
+    extension.api.see_lamps(empty)
+    assert codes(empty) == [(1, 0), (1, 0)]
+
+
+def test_lamps_beside_each_other(extension, ball, empty):
+    """Panes of a window have one number, lamps that can hide each other have none."""
+    panes = [
+        add_lamp(empty, "AREA", f"Pane {i}", (i % 2, i // 2, 3), (0, 0, 0), shape="SQUARE", size=1)
+        for i in range(4)
+    ]
+    assert codes(empty) == [(1, 1)] * 4
+    panes[3].location.z = 3.1
+    assert sorted(codes(empty)) == [(1, 0)] + [(1, 1)] * 3
+    panes[3].location.z = 3
+    extension.api.see_lamps(empty)  # as before a render
+    assert codes(empty) == [(1, 1)] * 4
+    panes[3].location.x = 0.9  # it overlaps Pane 2
+    assert sorted(codes(empty)) == [(1, 0)] + [(1, 1)] * 3
+    panes[3].location.x = 5
+    panes[3].rotation_euler = (math.pi, 0, 0)  # it shines the other way
+    assert sorted(codes(empty)) == [(1, 0)] + [(1, 1)] * 3
+    for pane in panes[1:]:
+        bpy.data.objects.remove(pane)
+    assert codes(empty) == [(1, 0)]
+    disk = add_lamp(empty, "AREA", "Disk", (1.1, 0.2, 3), (0, 0, 1), shape="DISK", size=0.5)
+    assert codes(empty) == [(1, 1)] * 2
+    # Without the extension nobody would see that it has moved over the other.
+    disk.keyframe_insert("location", frame=1)
+    extension.api.see_lamps(empty)
+    assert codes(empty) == [(1, 0)] * 2
 
 
 def test_quaternions_are_of_one_sign(ball, empty):
@@ -647,8 +718,16 @@ def test_flat_meshes_are_area_lamps(extension, ball, empty):
     (slot,) = slots(empty)
     assert slot[9] == 4 and sorted(slot[10:12]) == pytest.approx([2, 4], rel=0.02)
     bpy.data.objects.remove(bpy.data.objects["Panel"])
-    corner = [(0, 0), (2, 0), (2, 0.4), (0.4, 0.4), (0.4, 2), (0, 2)]
-    emissive_plane(empty, material, corner).location.z = 6
+    # Random rays meet the first of these two seldom, though it is wide.
+    for size, why in ((1.0, "neither flat, round nor small"), (6.0, "so large or near")):
+        corner = np.array([(0, 0), (2, 0), (2, 0.4), (0.4, 0.4), (0.4, 2), (0, 2)])
+        item = emissive_plane(empty, material, [tuple(c) for c in corner * (size, size)])
+        item.location.z = 6
+        (lamp,) = extension.api.see_lamps(empty)
+        assert lamp.slot is None and why in lamp.why
+        bpy.data.objects.remove(item)
+    tube = helpers.add_sphere(empty, material, segments=16)
+    tube.location, tube.scale = (2, 0, 1), (0.03, 0.03, 1)
     (lamp,) = extension.api.see_lamps(empty)
     assert lamp.slot is None and "neither flat, round nor small" in lamp.why
 

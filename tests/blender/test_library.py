@@ -85,9 +85,10 @@ def test_a_model_of_which_nothing_is_made_is_there_with_its_defaults(
 def test_every_picture_is_of_the_material_that_is_listed(library, monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "script")
     previews = importlib.import_module("asset_previews")
+    scene = importlib.import_module(f"{library.__name__}.preview")
     rows = (ROOT / "blender_addon" / "library" / "previews" / "made.csv").read_text().split()
     wanted = {
-        entry.preview.stem: previews.fingerprint(entry, previews.SIZE, previews.SAMPLES)
+        entry.preview.stem: previews.fingerprint(entry, scene.SIZE, scene.SAMPLES)
         for entry in library.entries()
     }
     assert dict(row.split(",") for row in rows) == wanted, "run script/assets"
@@ -193,7 +194,7 @@ def test_the_program_is_started_as_blender_expects_it(library, monkeypatch, tmp_
 )
 def test_a_library_that_can_not_be_made(extension, library, made, monkeypatch, command, message):
     files = {p.name: p.stat().st_mtime_ns for p in made.folder.iterdir()}
-    monkeypatch.setattr(library, "_command", lambda target: command)
+    monkeypatch.setattr(library, "build_command", lambda *arguments: command)
     with pytest.raises(extension.api.LibraryError, match=f"could not be made: .*{message}"):
         extension.api.add_library()
     with pytest.raises(RuntimeError, match="could not be made"):

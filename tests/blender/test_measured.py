@@ -13,6 +13,8 @@ import helpers
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.usefixtures("by_the_tool")
+
 
 def direction(theta, phi):
     theta, phi = np.radians(theta), np.radians(phi)
@@ -51,13 +53,6 @@ def write_table(extension, tmp_path_factory):
 @pytest.fixture(scope="module")
 def paint(write_table):
     return write_table("paint.csv", "ward", ks=(0.2, 0.1, 0.05), ax=0.25, ay=0.25)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def by_the_tool(program):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("BRDFC_TOOL", str(program))
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -138,6 +133,9 @@ def test_the_sum_of_lobes_is_added_up(extension, empty, found):
     for given in ([], None, "ward", ["ward", "lambert"], [{"model": "ward"}], [("ward", None)]):
         with pytest.raises(ValueError, match="Expected a list of lobes, each a model and a dict"):
             extension.api.new_sum(given)
+    most = extension.pack.manifest()["lobes"]["most"]
+    with pytest.raises(ValueError, match=f"Expected at most {most} lobes, got {most + 1}"):
+        extension.api.new_sum([("lambert", {})] * (most + 1))
     assert len(bpy.data.materials) == materials
 
 
@@ -238,7 +236,7 @@ def test_the_operator_makes_the_closest(extension, empty, paint):
         bpy.ops.brdfc.new_measured_material(filepath=str(paint) + "x")
     handler = bpy.types.FileHandler.bl_rna_get_subclass_py("BRDFC_FH_measured")
     assert handler.bl_import_operator == "brdfc.new_measured_material"
-    assert ".binary" in handler.bl_file_extensions
+    assert handler.bl_file_extensions == ".binary;.bsdf;.bin;.alta;.dat"
 
 
 @pytest.mark.parametrize(

@@ -700,7 +700,7 @@ def test_no_smooth_node_beside_it_is_nearer(
             f0=((ior - 1) / (ior + 1)) ** 2,
         )
         of_node = native.mirror(node, wo)
-        rest = native.albedo(node, wo, *native.view_terms(node, wo)) - of_node
+        rest = native.albedo(node, wo, native.view_terms(node, wo)) - of_node
         return weight @ ((of_node - mirror) ** 2 + (rest - scattered) ** 2).sum(axis=1)
 
     color, metallic, ior = np.array(near.color), near.metallic, near.ior

@@ -348,5 +348,5 @@ def test_a_profile_with_spaces_and_letters_of_other_scripts_and_read_only(
 )
 def test_what_is_written_first_lies_beside_the_file(extension, path):
     """On the same drive, because replacing a file is atomic only there."""
-    beside = extension.api._beside(path)
+    beside = extension.files.beside(path)
     assert beside.parent == path.parent and beside.name.startswith(".materials.json.")

@@ -163,3 +163,8 @@ def test_lines_fit_the_panel(extension, i18n, locale):
             # A word that can't be broken may exceed the width.
             assert labels.width(line) <= labels.room() or " " not in line, line
             assert not line.startswith(tuple(labels._CLOSING)), line
+
+
+def test_percentages_have_two_digits_and_no_exponent(i18n):
+    shares = {0.0025: "0.25", 0.123: "12", 0.994: "99", 0.996: "100", 12.3: "1230", 0: "0"}
+    assert {share: i18n.in_percent(share) for share in shares} == shares

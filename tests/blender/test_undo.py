@@ -14,6 +14,7 @@ CHANGE_NOTHING = {
     "brdfc.bake_plan",
     "brdfc.add_library",
     "brdfc.remove_library",
+    "brdfc.new_measured_library",
 }
 
 

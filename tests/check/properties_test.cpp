@@ -58,7 +58,9 @@ class Property : public testing::TestWithParam<std::string> {
 TEST_P(Property, ReciprocalModelsAre) {
   if (!info().properties.reciprocal) return;
   EXPECT_TRUE(rc::check(GetParam() + ": f(wi, wo) = f(wo, wi)", [&] {
-    const auto brdf = model().make_wide(any_parameters(info()));
+    const ParamValues v = any_parameters(info());
+    if (is_compensated(info(), v)) return;
+    const auto brdf = model().make_wide(v);
     const Vec3<Wide> wi = Vec3<Wide>::from(any_direction()), wo = Vec3<Wide>::from(any_direction());
     RC_ASSERT(apart(narrow(brdf->eval(wi, wo)), narrow(brdf->eval(wo, wi))) < 1e-9);
   }));
@@ -78,6 +80,7 @@ TEST_P(Property, ConservingModelsGainNothing) {
   if (!info().properties.conserving) return;
   EXPECT_TRUE(rc::check(GetParam() + ": albedo <= 1", [&] {
     const ParamValues v = any_parameters(info());
+    if (is_compensated(info(), v)) return;
     const measure::BoundModel b = measure::bind_model(model(), v);
     const Vec3<double> wo = any_direction();
     const measure::SampledAlbedo s = measure::sampled_albedo(*b.brdf, wo.z, std::atan2(wo.y, wo.x), b.label, 2048);

@@ -37,6 +37,14 @@ def utia(f):
     return np.ascontiguousarray(np.asarray(f, float).T, "<f8").tobytes()
 
 
+def alta(name, output, *columns, more=""):
+    """ALTA's text: the coordinates of a parametrisation, then the values."""
+    values = 3 if output == "RGB_COLOR" else 1
+    head = f"#DIM {len(columns) - values} {values}\n#PARAM_IN {name}\n#PARAM_OUT {output}\n{more}"
+    rows = ("\t".join(f"{x:.15g}" for x in row) for row in zip(*columns, strict=True))
+    return head + "\n".join(rows) + "\n"
+
+
 def rgl_fields(kind, seed=7):
     """A made-up material: "isotropic", "anisotropic" (half of the azimuths), "quarter" of them, or
     "spectral". Not a BRDF of anything, but every number matters."""
@@ -71,6 +79,35 @@ def rgl_fields(kind, seed=7):
     }
     if kind == "spectral":
         fields["wavelengths"] = np.linspace(360, 800, channels)
+    return {k: a if a.dtype == np.uint8 else a.astype(np.float32) for k, a in fields.items()}
+
+
+def facets(azimuths):
+    """A file whose visible normals are those of its facets, as in files that were measured, and
+    whose other numbers are all 1; of a circle, half a circle or a quarter, as many azimuths."""
+    size, circle = 48, len(azimuths) > 1
+    u = np.linspace(0, 1, size)
+    theta, phi = np.clip(u, 1e-3, 1) ** 2 * np.pi / 2, 2 * np.pi * u - np.pi
+    m = direction(theta, phi[:, None])
+    width = 0.2 * (1 + (0.5 * np.cos(2 * phi[:, None]) if circle else 0))
+    ndf = np.exp(-((theta / width) ** 2)) + 1e-4
+    density = ndf * u * np.sin(theta)  # in the unit square
+    view = direction(np.radians(np.linspace(0, 85, 12)), np.asarray(azimuths)[:, None])
+
+    def visible(w):
+        return np.maximum(w @ m.reshape(-1, 3).T, 0).reshape(*w.shape[:-1], size, size) * density
+
+    fields = {
+        "description": np.frombuffer(b"Facets", np.uint8),
+        "jacobian": np.array([1], np.uint8),
+        "phi_i": np.asarray(azimuths),
+        "theta_i": np.radians(np.linspace(0, 85, 12)),
+        "ndf": ndf * np.ones((size, 1)),
+        # The last azimuth is the first one.
+        "sigma": 2 * np.pi**2 * visible(m)[..., :-1, :].mean((-1, -2)),
+        "vndf": visible(view),
+        "rgb": np.ones((len(azimuths), 12, 3, 8, 8)),
+    }
     return {k: a if a.dtype == np.uint8 else a.astype(np.float32) for k, a in fields.items()}
 
 

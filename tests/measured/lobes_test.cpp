@@ -135,7 +135,7 @@ TEST(FitLobes, ASumReflectsNoMoreThanComesOrSaysSo) {
     double most = 0;
     for (const double degrees : {0., 15., 30., 45., 60., 75., 85., 89.})
       most = std::max(most, max_component(measure::sampled_albedo(*brdf, std::cos(degrees * kPi / 180)).scattered));
-    EXPECT_NEAR(sums.back().brightest, most, 0.02);
+    EXPECT_NEAR(sums.back().brightest.albedo, most, 0.02);
     EXPECT_EQ(most < 1.01, !gains) << most;
   }
 }

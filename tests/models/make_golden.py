@@ -756,7 +756,7 @@ def beckmann_d_fp(p, hn):
 def micro_d(p, h):
     ax, ay = mp.mpf(p["ax"]), mp.mpf(p["ay"])
     slope2 = ((h[0] / ax) ** 2 + (h[1] / ay) ** 2) / h[2] ** 2
-    if p["distribution"] == "ggx":
+    if p["distribution"] != "beckmann":
         return 1 / (mp.pi * ax * ay * h[2] ** 4 * (1 + slope2) ** 2)
     return mp.exp(-slope2) / (mp.pi * ax * ay * h[2] ** 4)
 
@@ -767,7 +767,7 @@ def micro_lambda(p, w):
     if across == 0:
         return 0
     a = w[2] / across
-    if p["distribution"] == "ggx":
+    if p["distribution"] != "beckmann":
         return (mp.sqrt(1 + 1 / a**2) - 1) / 2
     c = [mp.mpf(x) for x in ("1.259", "0.396", "3.535", "2.181")]
     return (1 - c[0] * a + c[1] * a**2) / (c[2] * a + c[3] * a**2) if a < mp.mpf("1.6") else 0
@@ -792,13 +792,39 @@ def micro_f(p, wi, wo):
         "v_cavity": cavity(h[2], oh, ki[2], ko[2]),
     }[p["masking"]]
     shape = micro_d(p, h) * g / (4 * ki[2] * ko[2])
-    return [c * shape for c in micro_fresnel(p, oh)]
+    if p["distribution"] != "multiscatter_ggx":
+        return [c * shape for c in micro_fresnel(p, oh)]
+    lost = micro_lost(p, ko[2])
+    more = [1 + mp.mpf(c) * lost / (1 - lost) for c in p["again"]]
+    return [c * m * shape for c, m in zip(micro_fresnel(p, oh), more, strict=True)]
+
+
+#: The model's fit of the light that single reflection loses, by powers of the height and the width.
+MICRO_LOST = (
+    (0.71753, 0.87757, 0.27211, -0.14623, 0.01419, 0.04226, -0.03416, -0.01468, 0.01455),
+    (0.46063, 0.27899, 0.09673, -0.03409, -0.12826, -0.03108, 0.06197, -0.01006),
+    (0.41162, 0.54141, 0.05548, -0.00918, 0.06144, -0.1257, 0.09608),
+    (0.54289, 0.90128, 0.20428, -0.8006, -0.29042, 0.30556),
+    (0.60854, 0.77858, 0.93307, -0.06118, -0.95463),
+    (-1.06112, 0.89166, 1.35493, 0.16223),
+    (-1.9358, 1.12287, 1.29002),
+    (1.18473, 0.903),
+    (1.65487,),
+)
+
+
+def micro_lost(p, cos_o):
+    alpha = mp.sqrt(mp.mpf(p["ax"]) * mp.mpf(p["ay"]))
+    m = mp.mpf(cos_o) / (cos_o + alpha)
+    x, y = 2 * mp.sqrt(m) - 1, 2 * alpha - 1
+    terms = [c * x**i * y**j for i, row in enumerate(MICRO_LOST) for j, c in enumerate(row)]
+    return m ** mp.mpf("0.75") * (1 - m) * sum(terms)
 
 
 def micro_pdf(p, wi, wo):
     """Visible normals, Heitz's eq. 16, of Smith's or of V-cavities, then reflection."""
     _, ko, h, oh = half(wi, wo)
-    smith = p["distribution"] == "ggx" and p["masking"] != "v_cavity"
+    smith = p["distribution"] != "beckmann" and p["masking"] != "v_cavity"
     g1 = 1 / (1 + micro_lambda(p, ko)) if smith else min(1, 2 * h[2] * ko[2] / oh)
     return micro_d(p, h) * g1 * oh / ko[2] / (4 * oh)
 
@@ -809,7 +835,7 @@ def micro_albedo(p, cos_o):
     def at(w):
         s = (p["ax"] * w[0]) ** 2 + (p["ay"] * w[1]) ** 2
         a = w[2] / math.sqrt(max(s, 1e-300))
-        if p["distribution"] == "ggx":
+        if p["distribution"] != "beckmann":
             return (math.sqrt(1 + 1 / a**2) - 1) / 2
         fit = (1 - 1.259 * a + 0.396 * a**2) / (3.535 * a + 2.181 * a**2)
         return fit if a < 1.6 else 0
@@ -820,7 +846,7 @@ def micro_albedo(p, cos_o):
         sin = math.sqrt(1 - hn**2)
         h = (sin * math.cos(phi), sin * math.sin(phi), hn)
         slope2 = ((h[0] / p["ax"]) ** 2 + (h[1] / p["ay"]) ** 2) / hn**2
-        d = 1 / (1 + slope2) ** 2 if p["distribution"] == "ggx" else math.exp(-slope2)
+        d = 1 / (1 + slope2) ** 2 if p["distribution"] != "beckmann" else math.exp(-slope2)
         d /= math.pi * p["ax"] * p["ay"] * hn**4
         wi = [2 * oh * a - b for a, b in zip(h, wo, strict=True)]
         g = {
@@ -830,7 +856,11 @@ def micro_albedo(p, cos_o):
         }[p["masking"]]()
         return d * g * oh / no * float(micro_fresnel(p, oh)[0])
 
-    return [half_albedo(one, lambda p: min(p["ax"], p["ay"]))(p, cos_o)] * 3
+    found, more = half_albedo(one, lambda p: min(p["ax"], p["ay"]))(p, cos_o), 1
+    if p["distribution"] == "multiscatter_ggx":
+        lost = float(micro_lost(p, cos_o))
+        more = 1 + p["again"][0] * lost / (1 - lost)
+    return [found * more] * 3
 
 
 # ---- Ward, in three normalisations -------------------------------------------------------------
@@ -1427,6 +1457,7 @@ MODELS = {
         defaults={
             "f0": (0.9, 0.6, 0.3),
             "tint": (1, 1, 1),
+            "again": (1, 1, 1),
             "ax": 0.3,
             "ay": 0.3,
             "distribution": "ggx",
@@ -1442,6 +1473,8 @@ MODELS = {
             {"distribution": "beckmann", "masking": "v_cavity"},
             {"ax": 1e-4, "ay": 1e-4},
             {"distribution": "beckmann", "ax": 1e-4, "ay": 1},
+            {"distribution": "multiscatter_ggx", "ax": 0.5, "ay": 0.5},
+            {"distribution": "multiscatter_ggx", "ax": 0.01, "ay": 1, "again": (0, 0.3, 0.7)},
         ],
         albedo_cases=[
             {"ax": 0.5, "ay": 0.5, "f0": (1, 1, 1)},
@@ -1449,6 +1482,7 @@ MODELS = {
             {"f0": (1, 1, 1), "masking": "smith_separable"},
             {"f0": (1, 1, 1), "masking": "v_cavity"},
             {"f0": (1, 1, 1), "distribution": "beckmann", "ax": 1, "ay": 1},
+            {"f0": (1, 1, 1), "distribution": "multiscatter_ggx", "ax": 0.7, "ay": 0.7},
         ],
         cosines=[1, 0.5, 0.1],
     ),

@@ -139,9 +139,10 @@ TEST(Shader, EveryFormStaysInsideWhatCyclesKeeps) {
       const forms::Shader s = kind->write(*model, empty_table(*model));
       EXPECT_LE(s.slots, kMaxClosures) << s.name;
       // In addition to sampling, aimed forms contain the computations for lamps (including those cut off by the
-      // horizon), a base and the model's value; lossless' value is a long sum, and its base has eight colours.
+      // horizon), a base and the model's value; lossless' value is a long sum, and its base has eight colours. That of
+      // microfacet contains a polynomial with 45 coefficients for one of its choices.
       const bool aimed = kind == forms::form("aimed");
-      EXPECT_LT(s.operations, name == "factors" ? 2400 : !aimed ? 600 : name == "lossless" ? 2900 : 1400) << s.name;
+      EXPECT_LT(s.operations, name == "factors" ? 2400 : !aimed ? 600 : name == "lossless" ? 2900 : 1450) << s.name;
       EXPECT_THAT(s.source, HasSubstr("shader " + s.name + "("));
     }
 }

@@ -46,7 +46,7 @@ using testing::HasSubstr;
 constexpr double kSigmas = 4.5;
 
 /// White by default.
-Material material(const std::string& model, ParamValues values) {
+Material material_with(const std::string& model, ParamValues values) {
   Material m;
   m.id = model;
   m.model = &find_model(model);
@@ -54,7 +54,7 @@ Material material(const std::string& model, ParamValues values) {
   return m;
 }
 ParamValue grey(double x) { return std::array<double, 3>{x, x, x}; }
-Material lambert(double rho) { return material("lambert", {{"rho", grey(rho)}}); }
+Material lambert(double rho) { return material_with("lambert", {{"rho", grey(rho)}}); }
 
 Object object(Mesh mesh, Vec3<double> at = {0, 0, 0}, int material = 0) {
   Object o;
@@ -271,14 +271,14 @@ TEST(Reference, WhiteFurnace) {
   for (const float x : white.rgb) EXPECT_FLOAT_EQ(x, 1);
   // The coupled model chooses between mirror and diffuse at random.
   s.objects = {object(make_sphere(1, 256, 128, true))};
-  s.materials = {material("coupled", {{"r0", 0.05}, {"rm", grey(1)}})};
+  s.materials = {material_with("coupled", {{"r0", 0.05}, {"rm", grey(1)}})};
   const Estimate e = total(render(s, options(24, 512, 1)).rendering);
   EXPECT_LT(e.error, 1e-3);
   EXPECT_NEAR(e.mean, 1, kSigmas * e.error + 2e-4);  // smooth normals lose a little light at the rim
 }
 
 TEST(Reference, MirrorAndRestTogetherAreUnbiased) {
-  const Material m = material("coupled", {{"r0", 0.3}, {"rm", grey(0.5)}});
+  const Material m = material_with("coupled", {{"r0", 0.3}, {"rm", grey(0.5)}});
   const auto brdf = m.model->make_double(m.values);
   const Vec3<double> wo{std::sin(1.0), 0, std::cos(1.0)};
   double albedo = brdf->mirror(wo).g;
@@ -300,9 +300,9 @@ TEST(Reference, MirrorAndRestTogetherAreUnbiased) {
 Scene busy_scene() {
   Scene s;
   s.camera = camera_above(4);
-  s.materials = {material("ashikhmin_shirley", {{"rs", grey(0.6)}, {"rd", grey(0.3)}, {"nu", 50.0}, {"nv", 10.0}}),
-                 material("radziszewski_alda", {{"n", 2.0}}), lambert(0.5),
-                 material("coupled", {{"r0", 0.1}, {"rm", grey(0.8)}})};
+  s.materials = {material_with("ashikhmin_shirley", {{"rs", grey(0.6)}, {"rd", grey(0.3)}, {"nu", 50.0}, {"nv", 10.0}}),
+                 material_with("radziszewski_alda", {{"n", 2.0}}), lambert(0.5),
+                 material_with("coupled", {{"r0", 0.1}, {"rm", grey(0.8)}})};
   s.objects = {object(make_sphere(0.8, 64, 32, true), {-0.9, 0.8, 0.8}, 0),
                object(make_sphere(0.8, 64, 32, true), {0.9, 0.8, 0.8}, 1), object(make_quad(8, 8), {0, 0, 0}, 2),
                object(make_box({2, 0.5, 0.6}), {0, -1.2, 0.3}, 3)};
@@ -361,9 +361,9 @@ TEST(Reference, PictureDoesNotDependOnThreads) {
 /// busy_scene() with bump maps, absorption, mirrors and transmission, a texture, and a wall that only the camera sees.
 Scene crowded_scene() {
   Scene s = busy_scene();
-  s.materials.push_back(material("glass", {{"density", 0.7}}));
-  s.materials.push_back(material("radziszewski_alda", {{"n", 20.0}, {"around", "refraction"}}));
-  s.materials.push_back(material("fresnel_conductor", {}));
+  s.materials.push_back(material_with("glass", {{"density", 0.7}}));
+  s.materials.push_back(material_with("radziszewski_alda", {{"n", 20.0}, {"around", "refraction"}}));
+  s.materials.push_back(material_with("fresnel_conductor", {}));
   auto picture = std::make_shared<Image>(2, 2);
   picture->rgb = {0.9f, 0.1f, 0.1f, 0.1f, 0.9f, 0.1f, 0.1f, 0.1f, 0.9f, 0.8f, 0.8f, 0.8f};
   s.materials[2].textures["rho"] = picture;
@@ -546,8 +546,8 @@ TEST(Reference, AnisotropyFollowsTheTangent) {
   const auto width_ratio = [](double degrees) {
     Scene s;
     s.camera = camera_above(2);
-    s.materials = {material("ashikhmin_shirley",
-                            {{"rs", grey(1)}, {"rd", grey(0)}, {"nu", 10.0}, {"nv", 1000.0}, {"part", "specular"}})};
+    s.materials = {material_with(
+        "ashikhmin_shirley", {{"rs", grey(1)}, {"rd", grey(0)}, {"nu", 10.0}, {"nv", 1000.0}, {"part", "specular"}})};
     s.objects = {object(make_quad(4, 4))};
     const double c = std::cos(degrees * kPi / 180), n = std::sin(degrees * kPi / 180);
     s.objects[0].transform.matrix = {{{c, -n, 0}, {n, c, 0}, {0, 0, 1}}};

@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from .. import slots
-from .light import ASIDE, Light, seen_from
+from .light import ASIDE, Light, keeps_its_place, seen_from
 
 
 def _is_round(light):
@@ -32,19 +32,33 @@ class Area(Light):
         spread = slots.Driven(light, "spread", -0.5 / math.pi, shape + 0.5)
         return slots.numbers(spread, *placed, sizes)
 
+    def sheet(self, item, light, matrix):
+        if self.is_distorted(matrix):
+            return None
+        axes = np.array([column.normalized() for column in matrix.to_3x3().transposed()])
+        centre, stays = np.array(matrix.translation), item is None or keeps_its_place(item)
+        return slots.Sheet(centre, axes, self._scaled(light, matrix), not _is_round(light), stays)
+
+    def _scaled(self, light, matrix):
+        """Its two sizes in world space."""
+        return tuple(
+            getattr(light, side) * abs(scale)
+            for side, scale in zip(self.sizes(light), matrix.to_scale(), strict=False)
+        )
+
     def irradiance(self, light, matrix, power, points):
         squared, along = seen_from(points, matrix)
         return power / math.pi / squared * np.maximum(along, ASIDE)
 
     def angular_size(self, light, matrix):
-        scaled = (
-            getattr(light, side) * scale
-            for side, scale in zip(self.sizes(light), matrix.to_scale(), strict=False)
-        )
-        return slots.angular_size_at(matrix.translation, math.hypot(*scaled) / 2)
+        radius = math.hypot(*self._scaled(light, matrix)) / 2
+        return slots.angular_size_at(matrix.translation, radius)
 
     def is_sizeless(self, light):
         return False
+
+    def is_distorted(self, matrix):
+        return slots.is_sheared(matrix)
 
     def is_lamp(self, light):
         return not light.cycles.is_portal and super().is_lamp(light)

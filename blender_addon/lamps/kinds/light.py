@@ -20,6 +20,18 @@ def has_importance(light):
     return light.cycles.use_multiple_importance_sampling
 
 
+def keeps_its_place(item):
+    """Whether nothing moves or resizes a light while the extension does not run, on a farm: neither
+    animation nor constraints of the object or its parents."""
+    if emission.animated(item.data):
+        return False
+    while item is not None:
+        if emission.animated(item) or len(item.constraints):
+            return False
+        item = item.parent
+    return True
+
+
 def seen_from(points, matrix):
     """Squared distance of points, (n, 3), from a light at the position in `matrix`, and the cosine
     between its axis and the direction to them; (n,) each."""
@@ -62,6 +74,11 @@ class Light(Kind, ABC):
     def angular_size(self, light, matrix):
         """A function of points, (n, 3): the tangent of its angular radius seen from there."""
 
+    def sheet(self, item, light, matrix):
+        """The slots.Sheet of a flat light, otherwise None. `item`: its object; None for an
+        instance."""
+        return None
+
     def is_sizeless(self, light):
         """Whether random rays can't hit it."""
         return self.smallest(light) == 0
@@ -77,6 +94,10 @@ class Light(Kind, ABC):
     def is_wide(self, light):
         """Whether it is a noisy highlight without Multiple Importance, because its light is that of
         one closure, with f towards one random point of the light."""
+        return False
+
+    def is_distorted(self, matrix):
+        """Whether a transform makes another shape of it than Cycles' light sampling assumes."""
         return False
 
     def is_like_new(self, light):
@@ -134,6 +155,7 @@ class Light(Kind, ABC):
             sizeless=sizeless,
             met=has_importance(light) and not sizeless,
             uneven=not self.is_even(light, matrix),
+            sheet=self.sheet(item, light, matrix),
         )
 
     def may_shine(self, item, emitting):
@@ -146,4 +168,5 @@ class Light(Kind, ABC):
         # Drivers follow transforms, unless their kind changes; a new ranking needs a survey.
         known = survey.transforms.get(item.original.name_full)
         changed = slots.transform_kind(item.matrix_world) != known
-        return changed or (known is not None and known[1]) or crowded
+        beside = item.original.name in survey.beside
+        return changed or (known is not None and known[1]) or crowded or beside

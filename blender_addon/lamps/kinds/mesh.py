@@ -264,13 +264,17 @@ def _candidate(item, name, shape, matrix):
     angular_size = slots.angular_size_at(middle, size)
     candidate = slots.Candidate(name, values, irradiance, angular_size, uneven=uneven)
     extent = min((high - low) * np.array(scales)) / 2
-    if np.linalg.norm(areas.sum(0)) > 0.05 * np.linalg.norm(areas, axis=1).sum():
+    surface = np.linalg.norm(areas, axis=1).sum()
+    if np.linalg.norm(areas.sum(0)) > 0.05 * surface:
         extent = 0.0  # an open surface: only part of a ball
 
     def judge(points):
         distance = np.sqrt(((points - middle) ** 2).sum(-1)).min()
         angle, fills = size / max(distance, 1e-9), extent / max(size, 1e-12)
-        if angle > (_LOOKS_WIDE if fills >= _IS_BALL else _LOOKS_LARGE):
+        # A convex body's silhouette has a quarter of its surface, on average over its turns.
+        wide = math.pi * (_LOOKS_LARGE / 2 * distance) ** 2
+        met_often = len(areas) == 0 or surface / 4 > wide
+        if angle > (_LOOKS_WIDE if fills >= _IS_BALL else _LOOKS_LARGE) and met_often:
             candidate.why = slots.NO_NEED
         elif angle > _LOOKS_SMALL and fills < _FILLS_BALL:
             candidate.why = say("a mesh that is neither flat, round nor small")
@@ -298,6 +302,9 @@ def _sheet(name, radiance, kind, middle, frame, sizes):
         turn = axes.to_quaternion()
         candidate.values = slots.numbers(
             kind, tuple(middle), (turn.x, turn.y, turn.z), (1, 1, turn.w), sizes
+        )
+        candidate.sheet = slots.Sheet(
+            middle, np.array(axes.transposed()), tuple(sizes), kind == slots.RECTANGLE, stays=True
         )
 
     candidate.judge = judge
