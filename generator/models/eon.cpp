@@ -42,7 +42,8 @@ template <class T> struct Eon {
                            .smooth = false,  // kinks where s changes its sign and where the angles are equal
                            .exact_sampling = false,
                            .diffuse_limit = "r=0",
-                           .albedo_table = false},  // not a polynomial in the colour
+                           .albedo_table = false,  // not a polynomial in the colour
+                           .fit_axis = "r"},
             .params = {}};
   }
 
