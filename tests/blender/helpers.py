@@ -16,7 +16,6 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 
-
 #: Models whose albedo no table can hold.
 WITHOUT_ALBEDO = ("eon", "factors")
 
