@@ -32,6 +32,7 @@ bool is_native(ClosureKind kind) {
 const char* kind_of(ClosureKind kind) {
   switch (kind) {
     case ClosureKind::Diffuse:
+    case ClosureKind::OrenNayar:  // the same node, with a roughness
       return "diffuse";
     case ClosureKind::DiffuseToon:
       return "cone";
@@ -64,8 +65,11 @@ ClosureSum<Expr> record_base(const Model& model, const ParamValues& fixed, const
   ClosureSum<Expr> sum = of->record(model.info(), fixed, input3("wo"));
   for (std::size_t i = 0; i < sum.size(); ++i) {
     Closure<Expr>& c = sum[i];
-    c.weight = c.weight * Expr::input("stands");
-    Json closure = {{"kind", kind_of(c.kind)}, {"weight", fmt::format("weight_{}", i)}};
+    const bool rough_matte = c.kind == ClosureKind::OrenNayar;  // the node has an albedo, and no weight beside it
+    Rgb<Expr>& colour = rough_matte ? c.albedo : c.weight;
+    colour = colour * Expr::input("stands");
+    Json closure = {{"kind", kind_of(c.kind)}, {"weight", fmt::format("{}_{}", rough_matte ? "albedo" : "weight", i)}};
+    if (rough_matte) closure["roughness"] = fmt::format("roughness_{}", i);
     if (has_facets(c.kind)) {
       c.weight = c.weight * Expr::input("camera");
       closure["roughness"] = fmt::format("roughness_{}", i);
@@ -78,7 +82,10 @@ ClosureSum<Expr> record_base(const Model& model, const ParamValues& fixed, const
     closures.push_back(closure);
   }
   output_closures(sum, program);
-  return input_closures(sum);
+  ClosureSum<Expr> inputs = input_closures(sum);
+  for (Closure<Expr>& c : inputs)
+    if (c.kind == ClosureKind::OrenNayar) c.weight = Rgb<Expr>(Expr(1));
+  return inputs;
 }
 
 ParamValues default_choices(const ModelInfo& info) {

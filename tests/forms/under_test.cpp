@@ -57,6 +57,8 @@ struct UnderRow {
 const UnderRow kUnderRows[] = {{"ashikhmin_shirley", {"rs=0,0,0"}, 0.9},
                                {"ashikhmin_shirley", {"part=diffuse"}, 0.95},
                                {"coupled", {}, 0.94},
+                               {"eon", {}, 0.97},
+                               {"eon", {"rho=1"}, 0.999999},
                                {"oren_nayar", {}, 0.75},
                                {"oren_nayar", {"form=qualitative"}, 0.9},
                                {"phong_material", {"ks=0", "kr=0"}, 0.999},
@@ -96,7 +98,13 @@ TEST(Under, IsRecordedAlikeForAllChoices) {
       Recorder recorder;
       std::vector<ClosureKind> here;
       for (const Closure<Expr>& c : of->record(m->info(), with_choices(m->info(), choices), input3("wo"))) {
-        EXPECT_TRUE(c.kind == ClosureKind::Diffuse || c.kind == ClosureKind::DiffuseToon || c.kind == ClosureKind::Ggx)
+        EXPECT_TRUE(c.kind == ClosureKind::Diffuse || c.kind == ClosureKind::OrenNayar ||
+                    c.kind == ClosureKind::DiffuseToon || c.kind == ClosureKind::Ggx)
+            << name;
+        // Blender's node has no weight beside the albedo.
+        std::array<double, 3> weight;
+        EXPECT_TRUE(c.kind != ClosureKind::OrenNayar ||
+                    (c.weight.is_constant(&weight) && weight == std::array{1.0, 1.0, 1.0}))
             << name;
         EXPECT_FALSE(c.turned || c.stretched != Tangent::None) << name;
         here.push_back(c.kind);
