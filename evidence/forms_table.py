@@ -16,11 +16,12 @@ from markdown_table import heading, line, percent
 
 FORMS = ("exact", "aimed", "sampled", "fitted", "twin")
 
-#: The parameters in which f is a polynomial, for models that have such parameters.
+#: The parameters in which f is a polynomial, or nearly so, for models that have such parameters.
 ANY = {
     "ashikhmin_shirley": ("rs", "rd"),
     "cook_torrance": ("f0",),
     "coupled": ("r0",),
+    "eon": ("rho",),
     "oren_nayar": ("rho",),
     "phong_material": ("kd", "cd", "ks", "cs", "kr", "cr"),
     "schlick": ("r",),
@@ -182,7 +183,7 @@ larger error: see [errors along a number](fits-over.md).""",
         "Errors of fitted forms, any shares and colours",
         f"""\
 Each row is the output of one `build/brdfc fit MODEL --any NAME...`. f is a polynomial of the named
-parameters, which may have any value; the error is that of the worst mixture.
+parameters, or nearly so; they may have any value. The error is that of the worst mixture.
 
 {VIEWS}""",
     ),

@@ -35,8 +35,7 @@ def has_albedo_script(model_name, representation):
 
 
 def has_albedo(model_name):
-    """Whether a model's forms can have an Albedo output: not where no table could have all of its
-    parameters."""
+    """Whether a model's forms can have an Albedo output: not where no table can hold it."""
     entry = pack.model(model_name)
     return not entry["scatter"] or entry.get("albedo") is not None
 

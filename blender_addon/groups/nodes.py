@@ -589,7 +589,7 @@ def add_albedo(node):
     if not group_content.has_albedo(tag["model"]):
         raise ValueError(
             say(
-                "{model} has no Albedo output: it has too many parameters for tables of it",
+                "{model} has no Albedo output: no table can hold its albedo",
                 model=pack.model(tag["model"])["label"],
             )
         )

@@ -297,7 +297,7 @@ DECLARED = (
     Row(
         "leaning_facets",
         WARNING,
-        "In Blender 4.5 this material is up to 7 % too bright where it is seen from the side; "
+        "In Blender 4.5 this material is up to 14 % too bright where it is seen from the side; "
         "Blender 5.0 is right",
         setting_rules.leaning_facets,
     ),

@@ -46,7 +46,7 @@ void add_albedo_command(CLI::App& app) {
     const Model& model = find_model(o->model);
     if (o->store) {
       if (!measure::has_albedo_table(model)) {
-        std::cerr << "brdfc albedo: " << o->model << " has no table: its shader adds the albedo up\n";
+        std::cerr << "brdfc albedo: " << o->model << " has no table: its shader adds the albedo up, or has none\n";
         return;
       }
       const measure::AlbedoTable table = measure::tabulate_albedo(model);

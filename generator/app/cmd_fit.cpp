@@ -60,9 +60,11 @@ void add_fit_command(CLI::App& app) {
   cmd->add_option("--over", o->over,
                   "Fit along this Number parameter, over the whole range of its slider, instead of a value. Adds a\n"
                   "column with its value: both ends, and the middle between any two knots of the tables");
-  cmd->add_option("--any", o->any,
-                  "Parameters of which f is a polynomial (degree up to 2 for a colour, 1 for a number), for any of\n"
-                  "their values: closures are fitted to f at a few values, and the worst error is printed");
+  cmd->add_option(
+      "--any", o->any,
+      "Parameters of which f is a polynomial (degree up to 2 for a colour, 1 for a number), or nearly so for a\n"
+      "single colour, for any of their values: closures are fitted to f at a few values, and the worst error is\n"
+      "printed");
   cmd->add_flag("--twin", o->twin,
                 "Error of the twin instead: Blender's own nodes, whose weights, roughness and tilt depend on the view");
   cmd->add_flag("--pairs", o->pairs,

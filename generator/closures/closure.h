@@ -148,20 +148,38 @@ template <class T> T matte_loss(const T& c) {
 /// The cosine-weighted mean of matte_loss() over all directions.
 inline constexpr double kMeanMatteLoss = kPi / 2 - 2.0 / 3 - (2 * kPi - 5.6) / 3;
 
-/// f of the closure OrenNayar without its weight. M. Oren, S. Nayar: Generalization of Lambert's Reflectance Model,
-/// SIGGRAPH 1994, in the form of Y. Fujii: A Tiny Improvement of Oren-Nayar Reflectance Model; with interreflection
-/// between facets as in J. Portsmouth, P. Kutz, S. Hill: EON: A Practical Energy-Preserving Rough Diffuse BRDF, JCGT
-/// 2025.
+/// Rough matte facets, with what their colours multiply: M. Oren, S. Nayar: Generalization of Lambert's Reflectance
+/// Model, SIGGRAPH 1994, in the form of Y. Fujii: A Tiny Improvement of Oren-Nayar Reflectance Model; with
+/// interreflection between facets as in J. Portsmouth, P. Kutz, S. Hill: EON: A Practical Energy-Preserving Rough
+/// Diffuse BRDF, JCGT 2025.
+template <class T> struct RoughMatte {
+  T level;      ///< f of white facets, without interreflection, seen from above
+  T once;       ///< f of white facets, without interreflection
+  T again;      ///< what white facets lack of a lossless surface
+  T mean_loss;  ///< the mean share of the light that facets send to other facets
+
+  /// `s` is the scalar product of the directions' components along the surface.
+  RoughMatte(const T& roughness, const T& cosTheta_i, const T& cosTheta_o, const T& s) {
+    level = T(1) / (T(kPi) + roughness * T(kPi / 2 - 2.0 / 3));
+    const T b = roughness * level;
+    const T t = select(s > T(0), s / maximum(maximum(cosTheta_i, cosTheta_o), tiny<T>()), s);
+    once = level + b * t;
+    // 1 - E(c) = b matte_loss(c), with the mean b kMeanMatteLoss. This form keeps its precision for smooth surfaces.
+    again = b * matte_loss(cosTheta_i) * matte_loss(cosTheta_o) * T(kInvPi / kMeanMatteLoss);
+    mean_loss = b * T(kMeanMatteLoss);
+  }
+  /// f of the light that facets of this albedo reflect twice or more.
+  Rgb<T> interreflection(const Rgb<T>& albedo) const {
+    return albedo * albedo * ((T(1) - mean_loss) * again) / (Rgb<T>(T(1)) - albedo * mean_loss);
+  }
+};
+
+/// f of the closure OrenNayar without its weight. Cycles multiplies the interreflection by the albedo once more than
+/// the paper does.
 template <class T> Rgb<T> rough_matte(const T& roughness, const Rgb<T>& albedo, const T& cosTheta_i,
                                       const T& cosTheta_o, const T& cosine) {
-  const T a = T(1) / (T(kPi) + roughness * T(kPi / 2 - 2.0 / 3)), b = roughness * a;
-  const T s = cosine - cosTheta_i * cosTheta_o;
-  const T t = select(s > T(0), s / maximum(maximum(cosTheta_i, cosTheta_o), tiny<T>()), s);
-  // 1 - E(c) = b matte_loss(c), with the mean b kMeanMatteLoss. This form keeps its precision for smooth surfaces.
-  const T again = b * matte_loss(cosTheta_i) * matte_loss(cosTheta_o) * T(kInvPi / kMeanMatteLoss);
-  const T mean_loss = b * T(kMeanMatteLoss);
-  const Rgb<T> twice = albedo * albedo * ((T(1) - mean_loss) * again) / (Rgb<T>(T(1)) - albedo * mean_loss);
-  return albedo * (Rgb<T>(a + b * t) + twice);
+  const RoughMatte<T> facets(roughness, cosTheta_i, cosTheta_o, cosine - cosTheta_i * cosTheta_o);
+  return albedo * (Rgb<T>(facets.once) + facets.interreflection(albedo));
 }
 
 /// f cos(theta_i) of the closure Velvet without its weight: M. Ashikhmin, S. Premoze: Distribution-based BRDFs, 2007.

@@ -64,6 +64,7 @@ template <Arithmetic T> Rgb<T> operator/(const Rgb<T>& a, const T& s) { return {
 template <Arithmetic T> Rgb<T> operator/(const Rgb<T>& a, const Rgb<T>& b) { return {a.r / b.r, a.g / b.g, a.b / b.b}; }
 template <Arithmetic T> Rgb<T>& operator+=(Rgb<T>& a, const Rgb<T>& b) { return a = a + b; }
 template <Numeric T> Rgb<T> select(bool condition, const Rgb<T>& a, const Rgb<T>& b) { return condition ? a : b; }
+template <Arithmetic T> Rgb<T> sqrt(const Rgb<T>& c) { return {sqrt(c.r), sqrt(c.g), sqrt(c.b)}; }
 template <Arithmetic T> Rgb<T> exp(const Rgb<T>& c) { return {exp(c.r), exp(c.g), exp(c.b)}; }
 template <Arithmetic T> Rgb<T> log(const Rgb<T>& c) { return {log(c.r), log(c.g), log(c.b)}; }
 template <Arithmetic T> T max_component(const Rgb<T>& c) { return maximum(c.r, maximum(c.g, c.b)); }

@@ -43,13 +43,13 @@ std::vector<ViewError> Along::errors(
   for (const double place : places) {
     const double number = axis_ ? axis_->at(place) : 0;
     std::vector<ViewError> worst;
-    for (const Terms::Term& term : terms_.terms) {
+    for (const ParamValues& mixed : terms_.judged()) {
       Varied<double> varied(number);
-      varied.parameters = colours_of(term.judged);
-      const auto of_term =
-          view_errors(bound(place, term.judged), [&](const Vec3<double>& wo) { return closures(wo, varied); });
-      if (worst.empty()) worst = of_term;
-      for (std::size_t i = 0; i < of_term.size(); ++i) worst[i] = worse(worst[i], of_term[i]);
+      varied.parameters = colours_of(mixed);
+      const auto of_mixed =
+          view_errors(bound(place, mixed), [&](const Vec3<double>& wo) { return closures(wo, varied); });
+      if (worst.empty()) worst = of_mixed;
+      for (std::size_t i = 0; i < of_mixed.size(); ++i) worst[i] = worse(worst[i], of_mixed[i]);
     }
     for (ViewError e : worst) {
       e.number = number;

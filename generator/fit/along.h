@@ -52,7 +52,7 @@ class Along {
   };
 
   /// The errors at these places of the closures that `closures` returns for a view and what they depend on. Each error
-  /// is that of the worst term, rounded to six digits as in files.
+  /// is that of the worst of Terms::judged(), rounded to six digits as in files.
   std::vector<ViewError> errors(
       const std::vector<double>& places,
       const std::function<ClosureSum<double>(const Vec3<double>& wo, const Varied<double>&)>& closures) const;

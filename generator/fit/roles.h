@@ -16,7 +16,7 @@ namespace brdfc::fit {
 enum class Role {
   Constant,  ///< its value is given; the fit is for this value
   Factor,    ///< f is proportional to it: the closures are fitted for 1 and multiplied by it, so it may vary
-  Mixed,     ///< f is a polynomial in it: closures are fitted to its terms and added up, so it may vary
+  Mixed,     ///< f is a polynomial in it, or nearly so: closures are fitted to its terms and added up, so it may vary
   Axis,      ///< the one number that the fit's tables run over
   Open       ///< none of these: a fit is possible only if its value is given
 };

@@ -202,6 +202,77 @@ bool positive(const Terms& terms, const Powers& degrees) {
   return true;
 }
 
+/// The terms of f = (x - w) f'(0) + w f(1) for a colour x, with w = c x^2 + (1 - c) x^3, where c is the best for all
+/// places. For one reflection f is proportional to x; what is reflected again and again has a weight such as
+/// x^2 / (1 - x L), where L is the light that stays each time. nullopt if f is none such.
+std::optional<Terms> nearly_polynomial(const Model& model, const std::vector<ParamValues>& places, const ParamInfo& p) {
+  constexpr int kSteps = 12;
+  const auto sum = [](const Rgb<double>& v) { return v.r + v.g + v.b; };
+  /// f less what the terms have with c = 0, and their change with c, at one place.
+  struct Seen {
+    std::vector<Rgb<double>> off, change;  ///< by step and pair of directions
+    std::vector<double> light;             ///< by step
+  };
+  std::vector<Seen> seen;
+  double wanted = 0, have = 0;
+  for (ParamValues values : places) {
+    const auto with = [&](const Rgb<double>& c) {
+      values[p.name] = as_value(p, c);
+      return model.make_double(values);
+    };
+    std::vector<std::unique_ptr<Brdf<double>>> steps;
+    for (int k = 0; k <= kSteps; ++k) steps.push_back(with(Rgb<double>(double(k) / kSteps)));
+    const auto faint = with(Rgb<double>(kNearlyNone)), coloured = with({0, 0.5, 1});
+    const auto where = pairs(model, values, 256);
+    Seen& here = seen.emplace_back();
+    for (int k = 1; k < kSteps; ++k) {
+      const double x = double(k) / kSteps;
+      double& light = here.light.emplace_back(0);
+      for (const auto& [wi, wo] : where) {
+        const Rgb<double> f = steps[std::size_t(k)]->eval(wi, wo), white = steps.back()->eval(wi, wo),
+                          once = faint->eval(wi, wo) / kNearlyNone, again = white - once;
+        light += sum(magnitude(f));
+        here.off.push_back(f - once * x - again * (x * x * x));
+        here.change.push_back(again * (x * x - x * x * x));
+      }
+    }
+    double white_light = 0;
+    for (const auto& [wi, wo] : where) {
+      const Rgb<double> black = steps.front()->eval(wi, wo), half = steps[kSteps / 2]->eval(wi, wo),
+                        white = steps.back()->eval(wi, wo), each = coloured->eval(wi, wo);
+      const double most = kTolerance * max_component(magnitude(white));
+      if (max_component(magnitude(black)) > most) return std::nullopt;
+      if (max_component(magnitude(each - Rgb<double>{black.r, half.g, white.b})) > most) return std::nullopt;
+      white_light += sum(white);
+    }
+    if (!(white_light > 0)) return std::nullopt;
+    for (std::size_t i = 0; i < here.off.size(); ++i) {
+      wanted += sum(here.off[i] * here.change[i]) / sqr(white_light);
+      have += sum(here.change[i] * here.change[i]) / sqr(white_light);
+    }
+  }
+  if (!(have > 0)) return std::nullopt;
+  const double c = wanted / have;
+  if (c < 0 || c > 2) return std::nullopt;  // a weight would be negative
+  double most = 0, furthest = 0;
+  for (const Seen& here : seen)
+    for (std::size_t k = 0; k < here.light.size(); ++k) {
+      double off = 0;
+      const std::size_t count = here.off.size() / here.light.size();
+      for (std::size_t i = k * count; i < (k + 1) * count; ++i)
+        off += sum(magnitude(here.off[i] - here.change[i] * c)) / here.light[k];
+      if (off > most) most = off, furthest = double(k + 1) / kSteps;
+    }
+  if (!(most <= kNearlyThere)) return std::nullopt;
+  const auto all = [&](double x) { return ParamValues{{p.name, as_value(p, Rgb<double>(x))}}; };
+  Terms out;
+  out.parameters = {p.name};
+  out.terms = {{all(kNearlyNone), kNearlyNone, all(kNearlyNone), {{{1}, 1}, {{2}, -c}, {{3}, c - 1}}},
+               {all(1), 1, all(1), {{{2}, c}, {{3}, 1 - c}}}};
+  out.furthest = all(furthest);
+  return out;
+}
+
 /// The closure of the set under the product of two elements, in which each parameter gets the higher of its two powers.
 std::set<Powers> closed(std::set<Powers> products) {
   for (std::size_t before = 0; before != products.size();) {
@@ -269,13 +340,17 @@ Terms terms_of(const Model& model, const ParamValues& known, const std::set<std:
   for (const ParamInfo& p : info.params)
     if (is_open(p) && !factors.count(p.name)) candidates.push_back(&p);
   const std::vector<ParamValues> asked = places(model, known);
+  std::vector<const ParamInfo*> others;  // colours that f is no polynomial of
   Powers degrees;
   for (const ParamInfo* p : candidates) {
     const int d = degree(model, asked, *p, candidates);
+    if (d > 2 && p->kind == ParamKind::Color) others.push_back(p);
     if (d == 0 || d > (p->kind == ParamKind::Color ? 2 : 1)) continue;
     open.push_back(p);
     degrees.push_back(d);
   }
+  if (open.empty() && others.size() == 1)
+    if (const std::optional<Terms> out = nearly_polynomial(model, asked, *others.front())) return *out;
   if (open.empty() || open.size() > kMaxParameters) return {};
   std::set<Powers> products = powers_in(model, asked, open, degrees);
   for (int tries = 0; tries < 2; ++tries) {
@@ -286,6 +361,13 @@ Terms terms_of(const Model& model, const ParamValues& known, const std::set<std:
     products = closed(std::move(products));
   }
   return {};
+}
+
+std::vector<ParamValues> Terms::judged() const {
+  std::vector<ParamValues> out;
+  for (const Term& term : terms) out.push_back(term.judged);
+  if (furthest) out.push_back(*furthest);
+  return out;
 }
 
 bool Terms::has(const std::string& parameter) const {

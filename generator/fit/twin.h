@@ -70,7 +70,7 @@ class Twin {
   /// The closures of the nodes for a view above the surface.
   ClosureSum<double> closures(const Vec3<double>& wo, const Varied<double>& = {}) const;
   /// Errors relative to the model, as view_errors() measures them. With an axis: at both its ends and in the middle
-  /// between any two places. With mixed parameters: for the worst term.
+  /// between any two places. With mixed parameters: for the worst of Terms::judged().
   const std::vector<ViewError>& errors() const { return errors_; }
 
  private:

@@ -39,7 +39,7 @@ ParamValues values_of_fit(const Model& model, const ParamValues& fixed) {
   // A number that scales curves says nothing of the light if the curves are not those of the fit.
   if (!info.properties.albedo_table)
     for (const ParamInfo& p : info.params)
-      if (p.kind == ParamKind::Number) known.insert(*defaults.find(p.name));
+      if (p.kind == ParamKind::Number && p.name != info.properties.fit_axis) known.insert(*defaults.find(p.name));
   for (const auto& [name, value] : fixed) known.erase(name);
   return known;
 }

@@ -32,6 +32,7 @@ bool is_native(ClosureKind kind) {
 const char* kind_of(ClosureKind kind) {
   switch (kind) {
     case ClosureKind::Diffuse:
+    case ClosureKind::OrenNayar:  // the same node, with a roughness
       return "diffuse";
     case ClosureKind::DiffuseToon:
       return "cone";
@@ -73,10 +74,13 @@ ClosureSum<Expr> record_base(const Model& model, const ParamValues& fixed, const
       closure[socket] = name;
       program.output(name, value);
     };
+    const bool is_rough_matte = c.kind == ClosureKind::OrenNayar;  // the node has an albedo, and no weight beside it
+    Rgb<Expr>& color = is_rough_matte ? c.albedo : c.weight;
     std::array<double, 3> known{1, 1, 1};
-    const bool is_black = c.weight.is_constant(&known) && known == std::array<double, 3>{};
+    const bool is_black = color.is_constant(&known) && known == std::array<double, 3>{};
     // Facets are not matte, so bent normals do not darken them.
-    output("weight", c.weight * Expr::input(has_facets(c.kind) ? "camera" : "stands"));
+    output("weight", color * Expr::input(has_facets(c.kind) ? "camera" : "stands"));
+    if (is_rough_matte) output("roughness", c.roughness);
     if (has_facets(c.kind)) {
       // As Blender's Glossy node has it: with r its squared Roughness, alpha is r (1 - anisotropy) along the tangent
       // and r / (1 - anisotropy) across it, or r / (1 + anisotropy) and r (1 + anisotropy) if it is negative.
@@ -84,7 +88,8 @@ ClosureSum<Expr> record_base(const Model& model, const ParamValues& fixed, const
       const Expr mean = is_stretched ? sqrt(c.alpha * c.alpha_across) : c.alpha;
       output("roughness", sqrt(mean));
       if (is_stretched)
-        output("anisotropy", select(c.alpha < c.alpha_across, Expr(1) - c.alpha / mean, c.alpha_across / mean - Expr(1)));
+        output("anisotropy",
+               select(c.alpha < c.alpha_across, Expr(1) - c.alpha / mean, c.alpha_across / mean - Expr(1)));
     }
     if (has_cone(c.kind)) {
       output("size", c.size);
@@ -92,7 +97,7 @@ ClosureSum<Expr> record_base(const Model& model, const ParamValues& fixed, const
     }
     closures.push_back(closure);
     if (is_black) continue;
-    c.weight = Rgb<Expr>::input(closure["weight"]);
+    color = Rgb<Expr>::input(closure["weight"]);
     used.push_back(c);
   }
   return used;

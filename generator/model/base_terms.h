@@ -47,16 +47,18 @@ template <class T> Closure<T> rough_facets(const Rgb<T>& weight, const T& ratio)
 }
 
 /// Rough matte facets of the albedo `rho` with all interreflection: J. Portsmouth, P. Kutz, S. Hill: EON: A Practical
-/// Energy-Preserving Rough Diffuse BRDF, JCGT 2025, with the exact albedo. Cycles' closure multiplies the
-/// interreflection by the colour once more than that. It is right for white facets; a second closure adds the rest,
-/// which is single reflection.
-template <class T> ClosureSum<T> lossless_rough_facets(const Rgb<T>& rho, const T& roughness) {
-  const T scale = T(1) + roughness * T(0.5 - 2 * kInvPi / 3);
-  const T lost = roughness * T(kInvPi * kMeanMatteLoss) / scale;
-  Closure<T> white(ClosureKind::OrenNayar, rho * rho * (T(1) - lost) / (Rgb<T>(T(1)) - rho * lost));
-  white.roughness = roughness;
-  white.albedo = Rgb<T>(T(1));
-  return {white, rough_facets((rho - white.weight) / scale, roughness)};
+/// Energy-Preserving Rough Diffuse BRDF, JCGT 2025, with the exact albedo. With a mean loss L it is
+/// rho once + rho^2 (1 - L) / (1 - rho L) again. Cycles' closure multiplies both by its albedo, once more than that.
+/// So with the albedo a and the weight rho / a it is the same, if a^2 / (1 - a L) = rho / (1 - rho L).
+template <class T> Closure<T> lossless_rough_facets(const Rgb<T>& rho, const T& roughness) {
+  const T lost = roughness * T(kInvPi * kMeanMatteLoss) / (T(1) + roughness * T(0.5 - 2 * kInvPi / 3));
+  Closure<T> c(ClosureKind::OrenNayar, Rgb<T>(T(0)));
+  c.roughness = roughness;
+  const Rgb<T> half = rho * (lost / T(2)), kept = Rgb<T>(T(1)) - rho * lost;
+  const Rgb<T> root = sqrt(half * half + rho * kept);
+  c.weight = root + half;
+  c.albedo = (root - half) / kept;
+  return c;
 }
 
 /// cos^e alpha about the mirror direction, without colours of its own.

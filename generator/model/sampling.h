@@ -79,15 +79,18 @@ template <class T> Vec3<T> sample_cosine(const T& u1, const T& u2) {
   return {sinTheta * cos(phi), sinTheta * sin(phi), sqrt(maximum(T(1) - u1, T(0)))};
 }
 
-/// A direction above the surface with the pdf (1 + 2 cos(theta)) / (4 pi), which does not vanish at the horizon.
-template <class T> Vec3<T> sample_everywhere(const T& u1, const T& u2) {
-  // Solves u1 = (c^2 + c) / 2 without cancellation.
-  const T c = T(4) * u1 / (T(1) + sqrt(T(1) + T(8) * u1)), sinTheta = sqrt(maximum(T(1) - c * c, T(0)));
+/// A direction above the surface, uniform with the probability `level` and else with the pdf cos(theta) / pi: the pdf
+/// (level + 2 (1 - level) cos(theta)) / (2 pi) does not vanish at the horizon. `level` must be above 0.
+template <class T> Vec3<T> sample_everywhere(const T& u1, const T& u2, const T& level = T(0.5)) {
+  // Solves u1 = (1 - level) c^2 + level c without cancellation.
+  const T twice = T(2) * level;
+  const T c = T(4) * u1 / (twice + sqrt(twice * twice + T(16) * (T(1) - level) * u1)),
+          sinTheta = sqrt(maximum(T(1) - c * c, T(0)));
   const T phi = T(2) * pi<T>() * u2;
   return {sinTheta * cos(phi), sinTheta * sin(phi), c};
 }
-template <class T> T everywhere_pdf(const Vec3<T>& wi) {
-  return select(wi.z > T(0), (T(1) + T(2) * wi.z) / (T(4) * pi<T>()), T(0));
+template <class T> T everywhere_pdf(const Vec3<T>& wi, const T& level = T(0.5)) {
+  return select(wi.z > T(0), (T(2) * level + T(4) * (T(1) - level) * wi.z) / (T(4) * pi<T>()), T(0));
 }
 
 /// sinh x without cancellation, for x small enough that e^x does not overflow.

@@ -84,8 +84,8 @@ struct ModelProperties {
   std::string specular_limit = "";
   TabulatedChoice tabulated = {};
   CompensatedChoice compensated = {};  ///< `reciprocal` and `conserving` do not apply to it
-  /// False for a model with so many parameters that no table of its albedo can have them all. It then has no Albedo
-  /// output.
+  /// False if no table can hold the albedo, because the model has too many parameters, or because the albedo is not a
+  /// polynomial of degree two in a colour. There is no Albedo output then.
   bool albedo_table = true;
   /// The number along which the repository stores a fit (fit/fit.h), with factors and mixed parameters open and the
   /// others at their defaults; "" if there is none.

@@ -102,6 +102,7 @@ class Lowering {
         if (color) return arg(n, 0).color * Expr(-1.0);
         return -real(0);
       case Op::Sqrt:
+        if (color) return sqrt(arg(n, 0).color);
         return sqrt(real(0));
       case Op::Cbrt:
         return select(real(0) < Expr(0.0), Expr(-1.0), Expr(1.0)) * pow(abs(real(0)), Expr(1 / 3.));

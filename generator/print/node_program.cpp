@@ -336,7 +336,7 @@ class Writer {
       case Op::Neg:
         return color ? add("V_SCALE", {args[0], number(-1)}, true) : add("MULTIPLY", {args[0], number(-1)}, false);
       case Op::Sqrt:
-        return add("SQRT", args, false);
+        return color ? by_channel("SQRT", args[0]) : add("SQRT", args, false);
       case Op::Exp:
         return color ? by_channel("EXPONENT", args[0]) : add("EXPONENT", args, false);
       case Op::Log:

@@ -219,6 +219,7 @@ Rgb<Expr> select(const Condition& c, const Rgb<Expr>& a, const Rgb<Expr>& b) {
   if (c.is_literal()) return c.literal() ? a : b;
   return Rgb<Expr>::of_node(build(Op::Select, {c.id(), a.id(), b.id()}));
 }
+Rgb<Expr> sqrt(const Rgb<Expr>& c) { return Rgb<Expr>::of_node(build(Op::Sqrt, {c.id()})); }
 Rgb<Expr> exp(const Rgb<Expr>& c) { return Rgb<Expr>::of_node(build(Op::Exp, {c.id()})); }
 Rgb<Expr> log(const Rgb<Expr>& c) { return Rgb<Expr>::of_node(build(Op::Log, {c.id()})); }
 Expr max_component(const Rgb<Expr>& c) { return Expr::of_node(build(Op::MaxComponent, {c.id()})); }

@@ -122,6 +122,7 @@ Rgb<Expr> operator/(const Rgb<Expr>&, const Expr&);
 Rgb<Expr> operator/(const Rgb<Expr>&, const Rgb<Expr>&);
 Rgb<Expr>& operator+=(Rgb<Expr>&, const Rgb<Expr>&);
 Rgb<Expr> select(const Condition&, const Rgb<Expr>&, const Rgb<Expr>&);
+Rgb<Expr> sqrt(const Rgb<Expr>&);
 Rgb<Expr> exp(const Rgb<Expr>&);
 Rgb<Expr> log(const Rgb<Expr>&);
 Expr max_component(const Rgb<Expr>&);

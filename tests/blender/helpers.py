@@ -16,6 +16,9 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 
+#: Models whose albedo no table can hold.
+WITHOUT_ALBEDO = ("eon", "factors")
+
 
 def with_every_model(form, *cases):
     """Cases (model, values), plus the default values of each model with the form that has no case.

@@ -95,10 +95,6 @@ def made_forms(extension, every_form):
     return [(*form, bpy.data.materials[name]) for form, name in names.items()]
 
 
-#: Models with too many parameters for a table of their albedo.
-WITHOUT_ALBEDO = ("factors",)
-
-
 def test_every_form_compiles_and_renders(extension, every_form, subtests):
     assert len(every_form.made) >= 4
     bpy.ops.wm.open_mainfile(filepath=str(every_form.blend))
@@ -113,7 +109,7 @@ def test_every_form_compiles_and_renders(extension, every_form, subtests):
             expected = extension.group_content.expected_inputs(model, representation)
             assert expected.items() <= found.items()
             apart = extension.nodes.has_albedo_script(model, representation)
-            outputs = ["BSDF"] if apart or model in WITHOUT_ALBEDO else ["BSDF", "Albedo"]
+            outputs = ["BSDF"] if apart or model in helpers.WITHOUT_ALBEDO else ["BSDF", "Albedo"]
             assert [s.identifier for s in script.outputs] == outputs
             assert script.mode == "INTERNAL" and script.bytecode
             for name in expected:
@@ -317,7 +313,7 @@ def test_sockets_equal_the_manifest(extension, made_forms, subtests):
                     assert all(choice in item.description for choice in parameter["choices"])
         for name in ("Normal", "Tangent"):
             assert sockets[name].hide_value and not sockets[name].is_linked
-        if model in WITHOUT_ALBEDO:
+        if model in helpers.WITHOUT_ALBEDO:
             assert [s.name for s in node.outputs] == ["BSDF"]
             with pytest.raises(ValueError, match="has no Albedo output"):
                 extension.nodes.add_albedo(node)

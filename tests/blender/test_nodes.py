@@ -50,6 +50,7 @@ CASES = [
     pytest.param("cook_torrance", {}, marks=SLOW),
     pytest.param("coupled", {}, marks=SLOW),
     pytest.param("lafortune", {}, marks=SLOW),
+    pytest.param("eon", {"rho": (0.9, 0.5, 0.2), "r": 0.8}, marks=SLOW),
     pytest.param("oren_nayar", {}, marks=SLOW),
     pytest.param("phong", {"e": 100.0}, marks=SLOW),
     pytest.param("radziszewski_alda", {"n": 4.0}, marks=SLOW),
@@ -149,10 +150,13 @@ def test_a_white_world(extension, model, values):
 )
 @pytest.mark.parametrize(("model", "values"), CASES)
 def test_lamps(extension, model, values, light):
-    """Blocks of a ball equal those of the aimed form, which was compared with the reference
-    renderer: no lamp counts twice, and none is lost."""
+    """Blocks of a ball equal those of the aimed or exact form, which was compared with the
+    reference renderer: no lamp counts twice, and none is lost."""
+    other = next(
+        f for f in ("aimed", "exact") if f in extension.api.models()[model]["representations"]
+    )
     # Of six pictures a few blocks with a rare bright dot decide the variance.
-    a, b = (blocks_of(extension, model, values, f, light, 128, 12) for f in ("nodes", "aimed"))
+    a, b = (blocks_of(extension, model, values, f, light, 128, 12) for f in ("nodes", other))
     off, error, noise = difference(a, b)
     print(f"{model}: {100 * off:+.2f} ± {100 * error:.2f} %, blocks {noise:.2f}")
     assert abs(off) < 4.5 * error + 5e-3

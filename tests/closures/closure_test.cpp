@@ -83,18 +83,21 @@ Rgb<double> eon(const Rgb<double>& rho, double r, const Vec3<double>& wi, const 
   return f * (wi.z / kPi);
 }
 
-TEST(Closure, LosslessRoughFacetsAreASumOfTwo) {
-  const Rgb<double> rho(0.95, 0.5, 0.05);
+TEST(Closure, LosslessRoughFacetsAreOneClosure) {
+  const Rgb<double> rho(0.95, 0.5, 0.05), ends(1, 0, 1e-9);
   for (const double r : {0.05, 0.3, 1.})
     for (const auto& [wi, wo] : {std::pair{at(30, 1), at(70, 1.5)}, {at(50, 0.4), at(75, 3)}, {at(5, 0), at(85, 2)}}) {
-      const ClosureSum<double> sum = lossless_rough_facets(rho, r);
-      const Rgb<double> found = evaluate(sum, wi, wo), expected = eon(rho, r, wi, wo);
-      for (const Closure<double>& c : sum) EXPECT_GE(std::min({c.weight.r, c.weight.g, c.weight.b}), 0);
-      EXPECT_NEAR(found.r, expected.r, 2e-5 * expected.r) << r;
-      EXPECT_NEAR(found.g, expected.g, 2e-5 * expected.g) << r;
-      EXPECT_NEAR(found.b, expected.b, 2e-5 * expected.b) << r;
-      // A single closure of this colour has too little interreflection.
-      EXPECT_LT(evaluate(rough_matte(r, rho), wi, wo).g, expected.g * (1 - 1e-3 * r));
+      for (const Rgb<double>& colour : {rho, ends}) {
+        const Closure<double> c = lossless_rough_facets(colour, r);
+        const Rgb<double> found = evaluate(c, wi, wo), expected = eon(colour, r, wi, wo);
+        EXPECT_GE(std::min({c.weight.r, c.weight.g, c.weight.b, c.albedo.r, c.albedo.g, c.albedo.b}), 0);
+        EXPECT_LE(std::max({c.weight.r, c.weight.g, c.weight.b, c.albedo.r, c.albedo.g, c.albedo.b}), 1);
+        EXPECT_NEAR(found.r, expected.r, 1e-13 * expected.r) << r;
+        EXPECT_NEAR(found.g, expected.g, 1e-13 * expected.g) << r;
+        EXPECT_NEAR(found.b, expected.b, 1e-13 * expected.b) << r;
+      }
+      // A closure of this colour and the weight 1 has too little interreflection.
+      EXPECT_LT(evaluate(rough_matte(r, rho), wi, wo).g, eon(rho, r, wi, wo).g * (1 - 1e-3 * r));
     }
 }
 

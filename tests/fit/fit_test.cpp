@@ -424,6 +424,7 @@ struct StoredRow {
 /// views, occurs where the lobe is wide and mostly below the surface.
 const StoredRow kStored[] = {{"blinn", {0.0221, 0.06755, 0.161}, {0.000687, 0.004371, 0.01198}},
                              {"cook_torrance", {0.04856, 0.1198, 0.2081}, {0.001148, 0.009879, 0.02324}},
+                             {"eon", {0.005808, 0.03635, 0.0417}, {0.000597, 0.005771, 0.0104}},
                              {"glossy_reflector", {0.01101, 0.1127, 0.2641}, {0.001935, 0.009183, 0.06801}},
                              {"lafortune", {0.008485, 0.04256, 0.05803}, {0.0002743, 0.00174, 0.01132}},
                              {"max_phong", {0.01432, 0.08615, 0.1726}, {0.002562, 0.01332, 0.05253}},
@@ -484,9 +485,9 @@ TEST(StoredFits, StateTheirErrors) {
     std::ranges::copy_if(fit.errors(), std::back_inserter(stated),
                          [&](const ViewError& e) { return e.number == number; });
     std::vector<double> l1(stated.size()), albedo(stated.size());
-    for (const Terms::Term& term : fit.terms().terms) {
+    for (const ParamValues& mixed : fit.terms().judged()) {
       ParamValues whole = roles_of(*model, values).fitted_at(number);
-      for (const auto& [name, value] : term.judged) whole[name] = value;
+      for (const auto& [name, value] : mixed) whole[name] = value;
       whole = complete(model->info(), whole);
       const Varied<double> varied = fit.varied(whole);
       const std::vector<ViewError> found = view_errors(

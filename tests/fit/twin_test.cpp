@@ -78,7 +78,7 @@ TEST(Twin, StatesItsError) {
 /// For the twins of the extension, between two rows of their tables, with mixed parameters at the worst of the values
 /// that are evaluated.
 TEST(Twin, StatesItsErrorAlongANumber) {
-  for (const char* name : {"max_phong", "cook_torrance", "schlick"}) {
+  for (const char* name : {"max_phong", "cook_torrance", "schlick", "eon"}) {
     const Model& m = find_model(name);
     const ParamValues given = forms::form("twin")->values(m, {});
     const Twin& twin = twin_of(m, given);
@@ -88,9 +88,9 @@ TEST(Twin, StatesItsErrorAlongANumber) {
       const ViewError& e = twin.errors().at(k);
       const Vec3<double> wo = direction(e.cos_theta_o, 0);
       double worst = 0;
-      for (const Terms::Term& term : twin.terms().terms) {
+      for (const ParamValues& mixed : twin.terms().judged()) {
         ParamValues values = roles_of(m, given).fitted_at(e.number);
-        for (const auto& [parameter, value] : term.judged) values[parameter] = value;
+        for (const auto& [parameter, value] : mixed) values[parameter] = value;
         const auto brdf = m.make_double(values);
         const auto [l1, albedo] = by_grid(*brdf, twin.closures(wo, varied_of(twin.axis(), twin.terms(), values)), wo);
         worst = std::max(worst, l1);

@@ -1099,6 +1099,48 @@ def oren_nayar_albedo(p, cos_o):
     return [r * direct + r * r * again for r in p["rho"]]
 
 
+# ---- EON: Portsmouth, Kutz and Hill, 2025 ------------------------------------------------------
+
+
+def eon_albedo_white(c, r, lib):
+    """The albedo of white facets without interreflection, and A."""
+    a = 1 / (1 + (lib.mpf(1) / 2 - 2 / (3 * lib.pi)) * r)
+    s = lib.sqrt(1 - c * c)
+    g = s * (lib.acos(c) - s * c) + lib.mpf(2) / 3 * (s / c * (1 - s**3) - s)
+    return a + r * a / lib.pi * g, a
+
+
+def eon_again(rho, r, a, lib):
+    """rho_ms and the mean albedo of white facets."""
+    mean = a * (1 + (lib.mpf(2) / 3 - 28 / (15 * lib.pi)) * r)
+    return rho**2 * mean / (1 - rho * (1 - mean)), mean
+
+
+def eon_f(p, wi, wo):
+    ki, ko = vec(wi), vec(wo)
+    r = mp.mpf(p["r"])
+    s = ki[0] * ko[0] + ki[1] * ko[1]
+    t = max(ki[2], ko[2]) if s > 0 else 1
+    (ei, a), (eo, _) = (eon_albedo_white(k[2], r, mp) for k in (ki, ko))
+    out = []
+    for rho in p["rho"]:
+        ms, mean = eon_again(mp.mpf(rho), r, a, mp)
+        lost = (1 - ei) * (1 - eo) / (1 - mean) if r > 0 else 0
+        out.append((rho * a * (1 + r * s / t) + ms * lost) / mp.pi)
+    return out
+
+
+def eon_albedo(p, cos_o):
+    e, a = eon_albedo_white(mp.mpf(cos_o), mp.mpf(p["r"]), mp)
+    return [rho * e + eon_again(mp.mpf(rho), p["r"], a, mp)[0] * (1 - e) for rho in p["rho"]]
+
+
+def eon_pdf(p, wi, wo):
+    """The generator's own mixture."""
+    c, level = vec(wi)[2], 0.6 * mp.mpf(p["r"]) * (1 - vec(wo)[2]) ** 3
+    return (1 - level) * c / mp.pi + level / (2 * mp.pi)
+
+
 # ---- Lafortune ---------------------------------------------------------------------------------
 
 
@@ -1523,6 +1565,19 @@ MODELS = {
             {"sigma": 1e-4},
             {"form": "qualitative"},
             {"form": "qualitative", "sigma": 0.6},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
+    "eon": dict(
+        f=eon_f,
+        pdf=eon_pdf,
+        albedo=eon_albedo,
+        defaults={"rho": (0.8, 0.8, 0.8), "r": 0.5},
+        cases=[
+            {},
+            {"r": 1, "rho": (1, 0.5, 0.1)},
+            {"r": 1e-4},
+            {"r": 0, "rho": (0.9, 0.2, 1e-6)},
         ],
         cosines=[1, 0.5, 0.1],
     ),
