@@ -342,8 +342,10 @@ def get_parameters(material):
 
 def switch_representation(material, representation):
     """Changes the form of a material with one model; values and links stay."""
-    nodes.switch(_the_node(material), representation)
-    prepare_material(material)
+    node = _the_node(material)
+    nodes.switch(node, representation)
+    for user in nodes.users_of(node.id_data):
+        prepare_material(user)
 
 
 def _prepare_all():
@@ -365,7 +367,8 @@ def update_materials():
 
 
 def plan_conversion(materials, limit=convert.LIMIT):
-    """Finds the nearest model for each visible Diffuse, Glossy, Principled or Glass node.
+    """Finds the nearest model for each visible Diffuse, Glossy, Principled or Glass node, also of
+    those in node groups, whose plans name the `others`, the materials that change as well.
 
     Returns [convert.Plan]; line() describes a plan in words. A plan has the model, its values and
     the fraction of the light that the replacement misplaces; or, where no model comes within
@@ -388,14 +391,15 @@ def convert_materials(plans):
     """
     plans = argument_checks.each(functools.partial(argument_checks.plan, convert.Plan), plans)
     count = convert.apply(plans)
-    for plan_ in plans:
-        if not plan_.refusal:
-            prepare_material(plan_.material)
+    changed = (material for plan_ in plans if not plan_.refusal for material in plan_.materials)
+    for material in dict.fromkeys(changed):
+        prepare_material(material)
     return count
 
 
 def convert_back(material):
-    """Restores the original nodes; where they were deleted, uses the model's twin instead.
+    """Restores the original nodes; where they were deleted, uses the model's twin instead. Nodes in
+    node groups are restored for all materials that use the groups.
 
     Returns the number of nodes restored. Raises ValueError where there is neither."""
     return convert.restore(argument_checks.material(material))

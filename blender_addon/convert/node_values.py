@@ -16,6 +16,9 @@ ROUGHNESSES = (0.2, 0.5, 0.8)
 GREY = (0.5, 0.5, 0.5)
 #: Such a colour may lie anywhere between these: a plan's error is then a range.
 DARK, BRIGHT = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+#: If the instances of a node have more colours, the error is computed for the darkest and the
+#: brightest.
+_MOST_COLORS = 4
 
 KINDS = {
     "ShaderNodeBsdfDiffuse": "diffuse",
@@ -69,6 +72,19 @@ _KNOWN_SETTINGS = {"distribution", "subsurface_method"}
 _OFTEN_ONE_COLOR = {"Alpha", "Base Color", "Color", "Emission Color", "Metallic"}
 
 
+#: Sockets of these effects do nothing while the effect is off.
+_WITHOUT_EFFECT = ("Weight", "Subsurface ", "Coat ", "Sheen ", "Thin Film ")
+
+
+def effective_sockets(node):
+    """The sockets of a convertible node that do something, or would if they had another value."""
+    return [
+        socket
+        for socket in node.inputs
+        if socket.enabled and (socket.name in _OFF or not socket.name.startswith(_WITHOUT_EFFECT))
+    ]
+
+
 class Refused(ValueError):
     """Why a node is not converted, in a few words."""
 
@@ -89,11 +105,12 @@ def _held(socket):
 
 
 class Inputs:
-    """The values of a node's sockets. Raises Refused if one varies in a way that no model can
-    follow."""
+    """The values of a node's sockets, which have to hold within all of its instances: `withins` as
+    for shader_trees.reach(). Raises Refused if one varies in a way that no model can follow."""
 
-    def __init__(self, node):
+    def __init__(self, node, withins=((),)):
         self._node, self._animated = node, animation.animated_properties(node)
+        self._withins = withins
         self._values = shader_values.Constants(), shader_values.Constants(images=True)
         self._found = {}
 
@@ -107,14 +124,25 @@ class Inputs:
     def constant(self, name):
         """The value of a socket, also through links; None if it is not constant."""
         if name not in self._found:
-            values = self._values[name in _OFTEN_ONE_COLOR]
-            self._found[name] = values.told(self._node.inputs[name])
+            values, socket = self._values[name in _OFTEN_ONE_COLOR], self._node.inputs[name]
+            told = {values.told(socket, within) for within in self._withins}
+            self._found[name] = told.pop() if len(told) == 1 else None
         return self._found[name]
 
+    def means(self, name):
+        """The distinct values, or their means over images; None if one of them is unknown."""
+        if (known := self.constant(name)) is not None:
+            return [known]
+        socket = self._node.inputs[name]
+        found = dict.fromkeys(shader_values.mean(socket, within) for within in self._withins)
+        return None if None in found else list(found)
+
     def mean(self, name):
-        """The value, or its mean over images; None if neither is known."""
-        known = self.constant(name)
-        return shader_values.mean(self._node.inputs[name]) if known is None else known
+        """The mean of these; None if one of them is unknown."""
+        found = self.means(name)
+        if found is None or not isinstance(found[0], tuple):
+            return found and sum(found) / len(found)
+        return tuple(sum(channel) / len(found) for channel in zip(*found, strict=True))
 
     def follows(self, name):
         """Whether a socket is linked to a value that varies. An animated socket raises Refused, as
@@ -136,10 +164,13 @@ class Inputs:
     def colors(self, name):
         """The colour for which a model is fitted, and the colours for which its error is
         computed."""
-        if self.follows(name) and (known := self.mean(name)) is None:
+        if self.follows(name) and self.means(name) is None:
             return GREY, (DARK, BRIGHT)
-        known = tuple(max(c, 0.0) for c in self.mean(name))
-        return known, (known,)
+        known = [tuple(max(c, 0.0) for c in color) for color in self.means(name)]
+        if len(known) > _MOST_COLORS:
+            known.sort(key=sum)
+            known = [known[0], known[-1]]
+        return tuple(max(c, 0.0) for c in self.mean(name)), tuple(known)
 
     def setting(self, name):
         """A setting of the node itself."""

@@ -14,6 +14,7 @@ from ..nearest.native_bsdf import Native
 from ..nearest.nearest_model import base_of, nearest, with_width
 from ..packs import device, pack
 from ..trees import shader_trees
+from .instances import Instances
 from .node_values import (
     KINDS,
     KNOWN_SOCKETS,
@@ -21,12 +22,15 @@ from .node_values import (
     Inputs,
     Refused,
     color_of,
+    effective_sockets,
     given_of,
     glows,
     is_transparent,
 )
 from .seen_node import SeenNode
 
+#: A row of a plan names this many other materials at most.
+_MOST_NAMES = 6
 #: A plan with a larger error is refused, unless another limit is given.
 LIMIT = 0.35
 
@@ -74,6 +78,10 @@ class Plan(Part):
     glows: bool = False
     transparent: bool = False
     refusal: str = ""
+    #: If the node is in a node group: the other materials that contain it, and the group's inputs
+    #: that had an effect on the node and have none on its replacement.
+    others: tuple = ()
+    unused: tuple = ()
     #: The state of the node when the plan was made.
     seen: SeenNode | None = None
 
@@ -103,25 +111,57 @@ class Plan(Part):
         low, high = map(in_percent, (self.least_error, self.error))
         return high if low == high else say("{low} to {high}", low=low, high=high)
 
+    @property
+    def kept(self):
+        """The sockets of the node whose links stay."""
+        parts = [part for part in self.parts if part.model]
+        found = {socket for part in parts for socket in part.links.values()}
+        found |= {"Normal", "Tangent"} & set(self.node.inputs.keys())
+        if any(part.widths or part.again for part in parts) or self.rest and len(self.rest[0]) > 1:
+            found.add("Roughness")
+        found |= {part.again[3] for part in parts if part.again}
+        found |= {"Metallic"} if self.metal else set()
+        found |= {"Alpha"} if self.transparent else set()
+        return found | ({"Emission Color", "Emission Strength"} if self.glows else set())
+
+    @property
+    def materials(self):
+        """Every material that changes."""
+        return (self.material, *self.others)
+
     def line(self):
         """What the node becomes, in words."""
         of = {"material": self.material.name, "node": Sentence(self.node.bl_label)}
-        if self.node.bl_idname == "ShaderNodeGroup":
-            of["node"] = self.node.node_tree.name
+        tree = self.node.id_data
+        if not tree.is_embedded_data:
+            of["node"] = say("{node} in {group}", node=of["node"], group=tree.name)
         if self.refusal:
             return say("{material}, {node}: stays, {why}", **of, why=self.refusal)
         of["model"] = self._label()
         if self.error < 1e-6:
-            return say("{material}, {node}: {model}, the same", **of)
-        return say(
-            "{material}, {node}: {model}, {percent} % of the light in other directions",
-            **of,
-            percent=self._percent(),
-        )
+            said = say("{material}, {node}: {model}, the same", **of)
+        else:
+            said = say(
+                "{material}, {node}: {model}, {percent} % of the light in other directions",
+                **of,
+                percent=self._percent(),
+            )
+        if self.others:
+            names = [material.name for material in self.others]
+            if len(names) > _MOST_NAMES:
+                rest = len(names) - _MOST_NAMES
+                listed = ", ".join(names[:_MOST_NAMES])
+                listed = say("{names} and {count} more", names=listed, count=rest)
+            else:
+                listed = ", ".join(names)
+            said = say("{row}. It changes {materials} too", row=said, materials=listed)
+        if self.unused:
+            names = ", ".join(self.unused)
+            said = say("{row}. Inputs of the group without effect: {names}", row=said, names=names)
+        return said
 
 
-def _plan_glass(material, node):
-    inputs = Inputs(node)
+def _plan_glass(material, node, inputs):
     inputs.setting("mute")
     inputs.check_unknown(KNOWN_SOCKETS["glass"])
     color, roughness = inputs.value("Color"), inputs.value("Roughness")
@@ -180,10 +220,9 @@ def _part(inputs, native, fit):
     return Part(candidate.model, values, links, widths, base, rest, again)
 
 
-def _plan_node(material, node):
+def _plan_node(material, node, inputs):
     if KINDS[node.bl_idname] == "glass":
-        return _plan_glass(material, node)
-    inputs = Inputs(node)
+        return _plan_glass(material, node, inputs)
     given, roughnesses = given_of(node, inputs)
     color = color_of(given["kind"])
     _, colors = inputs.colors(color)
@@ -238,36 +277,65 @@ def _mixed(share, plain, metal):
 
 
 def plan(materials):
-    """A Plan for each visible Diffuse, Glossy, Principled or Glass node of these materials. Refused
-    are other reflecting nodes, and groups that contain one of the four, as other materials may
-    share the groups."""
-    plans = []
+    """A Plan for each visible Diffuse, Glossy, Principled or Glass node of these materials, also of
+    those in node groups, once each. Refused are other reflecting nodes."""
+    plans, instances = {}, Instances()
     for material in materials:
         for node in _convertible(material):
+            place = node.as_pointer()
+            if place in plans and not plans[place].refusal:
+                continue
             try:
-                if why := editable.refusal(material):
+                if why := editable.refusal(material, node.id_data):
                     raise Refused(why)
                 if shader_trees.shading(material) is None:
                     raise Refused(shader_trees.NODES_OFF)
-                if node.bl_idname == "ShaderNodeGroup":
-                    raise Refused(say("its shader is inside this node group: ungroup it first"))
                 if node.bl_idname not in KINDS:
                     raise Refused(say("this extension has no model that is near"))
-                made = _plan_node(material, node)
+                withins = [instance.within for instance in instances.of(node)]
+                made = _plan_node(material, node, Inputs(node, withins))
             except Refused as why:
                 made = Plan(material=material, node=node, refusal=why.args[0])
-            plans.append(replace(made, seen=SeenNode(material, node)))
-    return plans
+            else:
+                made = _of_group(made)
+            plans[place] = replace(made, seen=SeenNode(material, node, instances))
+    return list(plans.values())
+
+
+def _of_group(made):
+    """The Plan with what its row says of the group that the node is in."""
+    tree = made.node.id_data
+    if tree.is_embedded_data:
+        return made
+    others = tuple(m for m in nodes.users_of(tree) if m != made.material)
+    effective = effective_sockets(made.node)
+    kept = {name for socket in made.kept for name in _group_inputs(made.node.inputs[socket])}
+    lost = [name for socket in effective for name in _group_inputs(socket) if name not in kept]
+    return replace(made, others=others, unused=tuple(dict.fromkeys(lost)))
+
+
+def _group_inputs(socket):
+    """The names of the inputs of its node group on which a socket depends."""
+    found, seen, waiting = [], set(), [shader_trees.reach(socket)]
+    while waiting:
+        reached = waiting.pop()
+        if reached.output is None or reached in seen:
+            continue
+        seen.add(reached)
+        if reached.node.bl_idname == "NodeGroupInput":
+            found.append(reached.output.name)
+        else:
+            waiting += [shader_trees.reach(s, reached.within) for s in reached.node.inputs]
+    return found
 
 
 def _convertible(material):
-    """The nodes of a material for which there is a Plan, in the order of its tree."""
+    """The nodes of a material for which there is a Plan, in the order of its trees."""
     if material.node_tree is None:
         return []
-    found = set()
-    for shown in shader_trees.shown_by(material.node_tree):
-        if shown.within:
-            found |= {shown.within[0]} if shown.node.bl_idname in KINDS else set()
-        elif shown.node.bl_idname not in STAYING and not nodes.is_ours(shown.node):
-            found.add(shown.node)
-    return [node for node in material.node_tree.nodes if node in found]
+    found = {shown.node for shown in shader_trees.shown_by(material.node_tree)}
+    return [
+        node
+        for node in nodes.all_nodes(material)
+        if node in found and node.bl_idname not in STAYING and not nodes.is_ours(node)
+    ]

@@ -8,47 +8,26 @@ import bpy
 import helpers
 import numpy as np
 import pytest
+from converting import (
+    KINDS,
+    OUTPUT,
+    driven,
+    flat,
+    keyed,
+    linked,
+    material_of,
+    only,
+    picture_node,
+    played,
+)
 from goniometer import Goniometer, tilted, unit
 
 GOLD = (0.9, 0.6, 0.2)
 BRIGHT = (1.5, 1.0, 0.5)
-OUTPUT = "ShaderNodeOutputMaterial"
-KINDS = {
-    "diffuse": "ShaderNodeBsdfDiffuse",
-    "glossy": "ShaderNodeBsdfAnisotropic",
-    "principled": "ShaderNodeBsdfPrincipled",
-    "glass": "ShaderNodeBsdfGlass",
-}
-
-
-def material_of(kind, distribution=None, **inputs):
-    """A material of one node; inputs by name, with underscores for spaces."""
-    material = bpy.data.materials.new(kind)
-    tree = helpers.empty_tree(material)
-    node = tree.nodes.new(KINDS[kind])
-    if distribution:
-        node.distribution = distribution
-    for name, value in inputs.items():
-        socket = node.inputs[name.replace("_", " ")]
-        socket.default_value = (*value, 1.0) if isinstance(value, tuple) else value
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(node.outputs[0], output.inputs["Surface"])
-    return material, node
-
-
-@pytest.fixture
-def convert(extension, empty):
-    extension.scene_loader.apply_clean_settings(empty)
-    return import_module(f"{extension.package}.convert")
 
 
 def nearest_model(convert):
     return import_module("..nearest.nearest_model", convert.__package__)
-
-
-def only(plans):
-    (plan,) = plans
-    return plan
 
 
 # ---- what Blender's nodes are taken for ----------------------------------------------------------
@@ -408,12 +387,6 @@ def test_the_error_is_that_of_the_pictures(extension, convert, empty):
 # ---- what stays ----------------------------------------------------------------------------------
 
 
-def linked(material, node, socket, kind="ShaderNodeRGB"):
-    source = material.node_tree.nodes.new(kind)
-    material.node_tree.links.new(source.outputs[0], node.inputs[socket])
-    return source
-
-
 def test_links_stay(extension, convert):
     material, node = material_of("principled", "GGX", Roughness=0.4)
     colour = linked(material, node, "Base Color")
@@ -445,24 +418,6 @@ def test_the_colour_of_a_mirror_may_be_linked(extension, convert, kind, inputs, 
     (group,) = extension.nodes.group_nodes(material)
     (socket,) = (s for s in group.inputs if s.is_linked)
     assert socket.links[0].from_node == colour and socket.type == "RGBA"
-
-
-def keyed(socket, name="default_value"):
-    socket.keyframe_insert(name, frame=1)
-
-
-def driven(socket):
-    curve = socket.driver_add("default_value")
-    (curve[0] if isinstance(curve, list) else curve).driver.expression = "frame / 100"
-
-
-def played(socket):
-    """By a strip in the Nonlinear Animation editor."""
-    keyed(socket)
-    data = socket.id_data.animation_data
-    action, slot = data.action, data.action_slot
-    data.nla_tracks.new().strips.new("Strip", 1, action).action_slot = slot
-    data.action = None
 
 
 ANIMATED = [
@@ -602,31 +557,6 @@ def test_what_no_model_has_stays_and_is_said(extension, convert, kind, inputs, w
     assert convert.apply([plan]) == 0
     assert helpers.counts() == before
     assert node.outputs[0].is_linked
-
-
-def test_a_shader_inside_a_group_stays_and_is_said(extension, convert):
-    inner = bpy.data.node_groups.new("Inner", "ShaderNodeTree")
-    inner.interface.new_socket("BSDF", in_out="OUTPUT", socket_type="NodeSocketShader")
-    glossy, end = inner.nodes.new("ShaderNodeBsdfGlossy"), inner.nodes.new("NodeGroupOutput")
-    inner.links.new(glossy.outputs[0], end.inputs[0])
-    outer = bpy.data.node_groups.new("Lack außen", "ShaderNodeTree")
-    outer.interface.new_socket("BSDF", in_out="OUTPUT", socket_type="NodeSocketShader")
-    nested, end = outer.nodes.new("ShaderNodeGroup"), outer.nodes.new("NodeGroupOutput")
-    nested.node_tree = inner
-    outer.links.new(nested.outputs[0], end.inputs[0])
-    material = bpy.data.materials.new("Grouped")
-    tree = extension.nodes.empty_tree(material)
-    group, output = tree.nodes.new("ShaderNodeGroup"), tree.nodes.new("ShaderNodeOutputMaterial")
-    group.node_tree = outer
-    assert convert.plan([material]) == [], "nothing shows it"
-    tree.links.new(group.outputs[0], output.inputs["Surface"])
-    plan = only(convert.plan([material]))
-    assert plan.line() == (
-        "Grouped, Lack außen: stays, its shader is inside this node group: ungroup it first"
-    )
-    assert convert.apply([plan]) == 0 and group.outputs[0].is_linked
-    # A model of this extension is a group as well, with nothing to convert inside.
-    assert convert.plan([extension.api.new_material("lambert")]) == []
 
 
 def test_a_plan_changes_nothing_and_a_failure_neither(extension, convert, monkeypatch):
@@ -772,16 +702,6 @@ def test_nodes_that_are_not_used_are_not_converted(extension, convert):
 # ---- as importers leave them ---------------------------------------------------------------------
 
 
-def picture_node(tree, *pixels, data=True):
-    """An Image Texture with one row of pixels, (r, g, b) or (r, g, b, a) each."""
-    image = bpy.data.images.new("Image", len(pixels), 1, alpha=True, is_data=data)
-    image.pixels.foreach_set(np.array([(*p, 1.0)[:4] for p in pixels], np.float32).ravel())
-    image.pack()
-    node = tree.nodes.new("ShaderNodeTexImage")
-    node.image, node.interpolation = image, "Closest"
-    return node
-
-
 def of_old_versions(material, node):
     """As Blender converts files of versions 2.91 to 3.6."""
     node.inputs["Emission Color"].default_value = (0.0, 0.0, 0.0, 1.0)
@@ -862,21 +782,6 @@ def test_what_importers_make_is_converted(extension, convert, imported, models):
     assert not plan.glows and not plan.transparent
     assert convert.apply([plan]) == 1
     assert len(extension.nodes.group_nodes(material)) == models
-
-
-def flat(scene, material):
-    """Colours of a plane in a white world, from left to right over the image on it."""
-    if "Plane" not in bpy.data.objects:
-        bpy.ops.mesh.primitive_plane_add(size=2, rotation=(np.pi / 2, 0, 0))
-        helpers.add_camera(scene, orthographic=2)
-        helpers.add_world(scene)
-        scene.render.resolution_x = scene.render.resolution_y = 8
-        scene.cycles.samples, scene.cycles.max_bounces = 512, 8
-        scene.cycles.sample_clamp_indirect = 0
-    bpy.data.objects["Plane"].data.materials.clear()
-    bpy.data.objects["Plane"].data.materials.append(material)
-    seen = helpers.render(scene)[2:6, :, :3]
-    return seen[:, :4].mean((0, 1)), seen[:, 4:].mean((0, 1))
 
 
 def is_half_metal(material, node):
