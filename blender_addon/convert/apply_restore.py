@@ -8,9 +8,10 @@ import bpy
 from ..common import editable
 from ..groups import bump_correction, nodes
 from ..packs import pack
+from ..trees import animation
 from .instances import Instances
 from .node_values import KINDS
-from .replacement import BEFORE, CORRECTED, HELPS, PreparedPart, Replacement
+from .replacement import BEFORE, CORRECTED, HELPS, MOVED, PreparedPart, Replacement
 
 
 def apply(plans):
@@ -88,14 +89,23 @@ def restore(material):
     return len(pairs)
 
 
+def _moved_back(node, before):
+    """The sockets to which animation was moved, and those of the restored node."""
+    sockets = nodes.sockets(node) if nodes.is_ours(node) else dict(node.outputs.items())
+    inputs = {socket.identifier: socket for socket in before.inputs}
+    marks = node[MOVED].to_dict() if MOVED in node else {}
+    return [(sockets[name], inputs[i]) for name, i in marks.items() if name in sockets]
+
+
 def _restore_node(group, before):
     tree, helpers = group.id_data, _helpers(group)
     if before is None:
         for model in [group, *filter(nodes.is_ours, helpers)]:
             nodes.switch(model, "twin")
-        for key in (BEFORE, CORRECTED):
+        for key in (BEFORE, CORRECTED, MOVED):
             group.pop(key, None)
         return
+    animation.move([pair for node in (group, *helpers) for pair in _moved_back(node, before)])
     for link in _outgoing(group, helpers):
         target = link.to_socket
         tree.links.remove(link)

@@ -104,6 +104,15 @@ def _held(socket):
     return tuple(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
 
 
+def has_own_animation(socket, animated):
+    """Whether a socket takes its own value, which is animated; `animated`: the properties of its
+    node that are."""
+    if animation.value_key(socket) not in animated:
+        return False
+    reached = shader_trees.reach(socket)
+    return reached.output is None and reached.holder == socket
+
+
 class Inputs:
     """The values of a node's sockets, which have to hold within all of its instances: `withins` as
     for shader_trees.reach(). Raises Refused if one varies in a way that no model can follow."""
@@ -117,9 +126,13 @@ class Inputs:
     def __contains__(self, name):
         return name in self._node.inputs
 
+    def moves(self, name):
+        """Whether a socket has a value of its own that is animated or driven: it can be moved."""
+        return name in self and has_own_animation(self._node.inputs[name], self._animated)
+
     def reaches(self, name):
-        """Whether the output of a node reaches a socket; such a link can be kept."""
-        return shader_trees.is_driven(self._node.inputs[name])
+        """Whether the output of a node, or an animation, controls a socket; either can be kept."""
+        return shader_trees.is_driven(self._node.inputs[name]) or self.moves(name)
 
     def constant(self, name):
         """The value of a socket, also through links; None if it is not constant."""
@@ -145,20 +158,21 @@ class Inputs:
         return tuple(sum(channel) / len(found) for channel in zip(*found, strict=True))
 
     def follows(self, name):
-        """Whether a socket is linked to a value that varies. An animated socket raises Refused, as
-        the animation would end with the node."""
-        if self.constant(name) is not None:
-            return False
-        if self.reaches(name):
-            return True
-        raise Refused(say("{socket} is animated", socket=Sentence(name)))
+        """Whether a socket has a value that varies, linked or animated. Raises Refused if something
+        behind its link is animated that Cycles passes over."""
+        if self.constant(name) is None and not self.reaches(name):
+            raise Refused(say("{socket} is animated", socket=Sentence(name)))
+        return self.constant(name) is None
 
     def value(self, name, default=0.0):
         """The value of a socket that has to be constant."""
         if name not in self:
             return default
         if self.follows(name):
-            raise Refused(say("{socket} is linked", socket=Sentence(name)))
+            what = Sentence(name)
+            if self.moves(name):
+                raise Refused(say("{socket} is animated", socket=what))
+            raise Refused(say("{socket} is linked", socket=what))
         return self.constant(name)
 
     def colors(self, name):

@@ -7,7 +7,8 @@ import bpy
 
 from ..groups import bump_correction, nodes
 from ..packs import pack
-from ..trees import shader_trees, shader_values
+from ..trees import animation, shader_trees, shader_values
+from .node_values import has_own_animation
 
 #: Custom property of a group node: the name of the node that it replaces.
 BEFORE = "brdfc_before"
@@ -16,6 +17,10 @@ BEFORE = "brdfc_before"
 CORRECTED = "brdfc_before_bump_map_correction"
 #: Custom property of the nodes that were added along with it: the name of the group node.
 HELPS = "brdfc_helps"
+#: Custom property of a node to which animation was moved: {name: identifier of the socket of the
+#: replaced node from which it comes}. The name is that of a model's parameter, or of a node's
+#: output.
+MOVED = "brdfc_moved"
 
 
 @dataclass(frozen=True)
@@ -31,18 +36,14 @@ class PreparedPart:
         return self.values | dict.fromkeys(self.part.links)
 
 
-def source_of(socket):
-    """The output that is linked to a socket, if the link has an effect."""
-    if not shader_trees.is_driven(socket):
-        return None
-    return next(link.from_socket for link in socket.links if shader_trees.counts(link))
-
-
 class Replacement:
     """Replaces the node of a Plan."""
 
     def __init__(self, plan, parts):
         self._plan, self._node, self._tree = plan, plan.node, plan.node.id_data
+        self._animated = animation.animated_properties(plan.node)
+        #: The nodes whose output has the animation of a socket of the replaced node, by its name.
+        self._moving = {}
         groups = [self._add(prepared) for prepared in parts]
         self._group, *others = groups
         self._group[BEFORE] = self._node.name
@@ -53,6 +54,7 @@ class Replacement:
                 if helper.get(HELPS) == other.name:
                     helper[HELPS] = self._group.name
         self._put(self._joined(groups))
+        self._move_animation()
 
     def _put(self, shader):
         """Links the shader where the node was."""
@@ -64,8 +66,41 @@ class Replacement:
         node.location = (node.location.x, node.location.y - 700)
 
     def _source(self, name):
-        """The output that controls a socket of the node; None if its own value does."""
-        return source_of(self._node.inputs[name])
+        """The output that controls a socket of the node; None if its own value does, which is not
+        animated."""
+        socket = self._node.inputs[name]
+        if shader_trees.is_driven(socket):
+            return next(link.from_socket for link in socket.links if shader_trees.counts(link))
+        if name not in self._moving and has_own_animation(socket, self._animated):
+            is_color = socket.type == "RGBA"
+            source = self._helper("ShaderNodeRGB" if is_color else "ShaderNodeValue")
+            source.location.x -= 440
+            source.label, source.outputs[0].default_value = name, socket.default_value
+            self._moving[name] = source
+        return self._moving[name].outputs[0] if name in self._moving else None
+
+    def _move_animation(self):
+        """Moves the animation of the node's sockets to a parameter, if it has just that effect, or
+        to the output of the node that was added for it."""
+        pairs = []
+        for name, source in self._moving.items():
+            socket, output = self._node.inputs[name], source.outputs[0]
+            target = output.links[0].to_socket if len(output.links) == 1 else None
+            if target is not None and nodes.is_ours(target.node) and target.type == socket.type:
+                names = {s: parameter for parameter, s in nodes.sockets(target.node).items()}
+                self._mark(target.node, names[target], socket)
+                target.default_value = socket.default_value
+                self._tree.nodes.remove(source)
+            else:
+                target = output
+                self._mark(source, output.name, socket)
+            pairs.append((socket, target))
+        animation.move(pairs)
+
+    @staticmethod
+    def _mark(node, name, socket):
+        marks = node[MOVED].to_dict() if MOVED in node else {}
+        node[MOVED] = marks | {name: socket.identifier}
 
     def _add(self, prepared):
         """The group node of a model, with the links of the node that it replaces."""
