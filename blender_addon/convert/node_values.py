@@ -7,11 +7,14 @@ import functools
 import bpy
 
 from ..common.i18n import Sentence, say
+from ..nearest import native_bsdf
 from ..nearest.native_bsdf import Native
 from ..trees import animation, shader_trees, shader_values
 
-#: The roughnesses at which a model is fitted when a texture provides the roughness.
+#: The roughnesses and anisotropies at which a model is fitted when a texture provides them; and in
+#: which pairs, if it provides both.
 ROUGHNESSES = (0.2, 0.5, 0.8)
+_ANISOTROPIES = (0.5, 0.8, 0.2)
 #: Colour at which the width is fitted if the linked colour is unknown.
 GREY = (0.5, 0.5, 0.5)
 #: Such a colour may lie anywhere between these: a plan's error is then a range.
@@ -134,6 +137,14 @@ class Inputs:
         """Whether the output of a node, or an animation, controls a socket; either can be kept."""
         return shader_trees.is_driven(self._node.inputs[name]) or self.moves(name)
 
+    def is_same_everywhere(self, name):
+        """Whether a link reaches a socket in all instances of the node, or in none as it has no
+        link."""
+        socket = self._node.inputs[name]
+        if not shader_trees.is_driven(socket):
+            return True
+        return all(shader_trees.reach(socket, w).output is not None for w in self._withins)
+
     def constant(self, name):
         """The value of a socket, also through links; None if it is not constant."""
         if name not in self._found:
@@ -213,7 +224,7 @@ class Inputs:
 
 
 def given_of(node, inputs):
-    """What all Natives of a node have in common, and their roughnesses."""
+    """What all Natives of a node have in common, and what they differ in."""
     kind = KINDS[node.bl_idname]
     inputs.setting("mute")
     inputs.check_unknown(KNOWN_SOCKETS[kind])
@@ -225,7 +236,6 @@ def given_of(node, inputs):
             raise Refused(say("its distribution is {kind}", kind=Sentence(name)))
         given["beckmann"] = distribution == "BECKMANN"
         given["multiscatter"] = distribution == "MULTI_GGX"
-        given["stretch"] = _stretch(inputs, kind)
     if kind == "principled":
         for name, (off, what) in _OFF.items():
             if inputs.value(name, off) != off:
@@ -240,8 +250,20 @@ def given_of(node, inputs):
         given["tint"] = tuple(min(max(c, 0.0), 1.0) for c in tint)
         given["diffuse_roughness"] = inputs.value("Diffuse Roughness")
     if inputs.follows("Roughness"):
-        return given, ROUGHNESSES
-    return given, (min(max(inputs.value("Roughness"), 0.0), 1.0),)
+        roughnesses = ROUGHNESSES
+    else:
+        roughnesses = (min(max(inputs.value("Roughness"), 0.0), 1.0),)
+    stretches = (1.0,)
+    if kind in ("glossy", "principled") and not is_mirror(roughnesses):
+        stretches = _stretches(inputs, kind)
+    count = max(len(roughnesses), len(stretches))
+    pairs = ((roughnesses * count)[:count], (stretches * count)[:count])
+    return given, [{"roughness": r, "stretch": s} for r, s in zip(*pairs, strict=True)]
+
+
+def is_mirror(roughnesses):
+    """Whether these roughnesses are that of a mirror alone."""
+    return max(roughnesses) < native_bsdf.SMOOTH
 
 
 def color_of(kind):
@@ -249,23 +271,42 @@ def color_of(kind):
 
 
 def natives(node):
-    """The node as Natives: one, or several roughnesses if the roughness is linked. Raises
+    """The node as Natives: one, or several if roughness or anisotropy are linked. Raises
     Refused."""
-    given, roughnesses = given_of(node, Inputs(node))
-    return [Native(**given, roughness=r) for r in roughnesses]
+    given, looks = given_of(node, Inputs(node))
+    return [Native(**given, **look) for look in looks]
 
 
-def _stretch(inputs, kind):
-    """Ratio of the lobe's width along the tangent to that across it."""
-    a = inputs.value("Anisotropic" if kind == "principled" else "Anisotropy")
-    if a == 0:
-        return 1.0
-    turn = inputs.value("Anisotropic Rotation" if kind == "principled" else "Rotation")
-    if turn != 0 or not inputs.reaches("Tangent"):
-        raise Refused(say("it is anisotropic without a Tangent that is linked, or turned"))
+#: Sockets of the anisotropy and of its rotation, by kind of node.
+ANISOTROPY = {
+    "glossy": ("Anisotropy", "Rotation"),
+    "principled": ("Anisotropic", "Anisotropic Rotation"),
+}
+#: The square of the ratio of a Principled node's widths, across and along the tangent, is
+#: 1 + RATIO * anisotropy.
+RATIO = -0.9
+
+
+def _stretches(inputs, kind):
+    """Ratio of the lobe's width along the tangent to that across it, or several."""
+    name, rotation = ANISOTROPY[kind]
+    if kind == "principled" and inputs.follows(name):
+        found = _ANISOTROPIES
+    else:
+        found = (inputs.value(name),)
+    if found == (0,):
+        return (1.0,)
+    # A model's own tangent is another one, and nodes that turn a vector take no default normal.
+    turned = inputs.follows(rotation) or inputs.constant(rotation) != 0
+    for socket in ("Tangent", *(["Normal"] if turned else [])):
+        if not inputs.is_same_everywhere(socket):
+            said = say(
+                "{socket} is a group input that is not linked everywhere", socket=Sentence(socket)
+            )
+            raise Refused(said)
     if kind == "principled":
-        return 1 / (1 - 0.9 * min(max(a, 0.0), 1.0))
-    return (1 - a) ** 2 if a > 0 else 1 / (1 + a) ** 2
+        return tuple(1 / (1 + RATIO * min(max(a, 0.0), 1.0)) for a in found)
+    return tuple((1 - a) ** 2 if a > 0 else 1 / (1 + a) ** 2 for a in found)
 
 
 def glows(inputs):

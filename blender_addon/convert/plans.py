@@ -16,6 +16,7 @@ from ..packs import device, pack
 from ..trees import shader_trees
 from .instances import Instances
 from .node_values import (
+    ANISOTROPY,
     KINDS,
     KNOWN_SOCKETS,
     STAYING,
@@ -43,7 +44,9 @@ class Part:
     values: dict = field(default_factory=dict)
     #: Parameters by socket of the node.
     links: dict = field(default_factory=dict)
-    #: Parameters that follow a linked roughness: (name, factor, power, low, high).
+    #: Parameters that follow a linked roughness or anisotropy: (name, factor, power, low, high,
+    #: stretched) for factor * roughness^power * (1 - 0.9 anisotropy)^stretched, clamped. A power of
+    #: 0 stands for what is not linked.
     widths: tuple = ()
     #: The matte base beneath the model, and the light that it gets: coefficients of layer.rest().
     base: "Part | None" = None
@@ -77,6 +80,8 @@ class Plan(Part):
     #: Alpha.
     glows: bool = False
     transparent: bool = False
+    #: Whether the models need the node's tangent: that of its link or Cycles' default one, turned.
+    anisotropic: bool = False
     refusal: str = ""
     #: If the node is in a node group: the other materials that contain it, and the group's inputs
     #: that had an effect on the node and have none on its replacement.
@@ -119,6 +124,8 @@ class Plan(Part):
         found |= {"Normal", "Tangent"} & set(self.node.inputs.keys())
         if any(part.widths or part.again for part in parts) or self.rest and len(self.rest[0]) > 1:
             found.add("Roughness")
+        if self.anisotropic:
+            found |= set(ANISOTROPY[KINDS[self.node.bl_idname]])
         found |= {part.again[3] for part in parts if part.again}
         found |= {"Metallic"} if self.metal else set()
         found |= {"Alpha"} if self.transparent else set()
@@ -195,16 +202,29 @@ def _shown(without_osl):
     return has
 
 
+def _widths(inputs, native, width, factor):
+    """Part.widths of a fit; `native`: the first Native of the fit."""
+    rough = inputs.reaches("Roughness")
+    stretched = native.kind == "principled" and inputs.follows(ANISOTROPY["principled"][0])
+    if not rough and not stretched:
+        return
+    if not rough:
+        factor *= max(native.roughness, 1e-3) ** width.power
+    for name, sign in ((width.name, 1), (width.across, -1)):
+        if name:
+            power = sign * width.stretched if width.across else 0
+            own = factor if stretched else factor * native.stretch**power
+            law = (width.power if rough else 0, width.low, width.high)
+            yield name, own, *law, -power if stretched else 0
+
+
 def _part(inputs, native, fit):
     """The Part for a Fit to a node; `native`: the first Native of the fit."""
     color = color_of(native.kind)
     candidate, factor, width = fit.candidate, fit.factor, fit.candidate.width
     links = {name: color if s == "Color" else s for name, s in candidate.links.items()}
-    values, widths = with_width(candidate, native, factor), ()
-    if width and inputs.reaches("Roughness"):
-        stretch = native.stretch**width.stretched if width.across else 1.0
-        named = [(width.name, stretch), (width.across, 1 / stretch)]
-        widths = tuple((n, factor * s, width.power, width.low, width.high) for n, s in named if n)
+    values = with_width(candidate, native, factor)
+    widths = tuple(_widths(inputs, native, width, factor)) if width else ()
     base, below = None, base_of(candidate, native, inputs.reaches("Roughness"))
     if below:
         linked = {name: color for name in candidate.base.candidate.links}
@@ -223,13 +243,13 @@ def _part(inputs, native, fit):
 def _plan_node(material, node, inputs):
     if KINDS[node.bl_idname] == "glass":
         return _plan_glass(material, node, inputs)
-    given, roughnesses = given_of(node, inputs)
+    given, looks = given_of(node, inputs)
     color = color_of(given["kind"])
     _, colors = inputs.colors(color)
 
     def near(**other):
         """The Part for the node with these values changed, and its Fit."""
-        looked = tuple(Native(**given | other, roughness=r) for r in roughnesses)
+        looked = tuple(Native(**given | other, **look) for look in looks)
         has = _shown(device.lacks_osl(lamps.current_scene()))
         fit = nearest(looked, colors, inputs.reaches(color), has)
         if fit is None:
@@ -246,6 +266,7 @@ def _plan_node(material, node, inputs):
             )
         more |= {"material": material, "node": node}
         more |= {"error": max(errors), "least_error": min(errors)}
+        more |= {"anisotropic": any(look["stretch"] != 1 for look in looks)}
         return Plan(**vars(part), **more)
 
     if given["kind"] != "principled":

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Puts models, and the nodes that connect them, in the place of one of Blender's nodes."""
 
+import math
 from dataclasses import dataclass
 
 import bpy
@@ -8,7 +9,7 @@ import bpy
 from ..groups import bump_correction, nodes
 from ..packs import pack
 from ..trees import animation, shader_trees, shader_values
-from .node_values import has_own_animation
+from .node_values import ANISOTROPY, KINDS, RATIO, has_own_animation
 
 #: Custom property of a group node: the name of the node that it replaces.
 BEFORE = "brdfc_before"
@@ -44,6 +45,8 @@ class Replacement:
         self._animated = animation.animated_properties(plan.node)
         #: The nodes whose output has the animation of a socket of the replaced node, by its name.
         self._moving = {}
+        #: The tangent of an anisotropic node, once it is made.
+        self._turned = None
         groups = [self._add(prepared) for prepared in parts]
         self._group, *others = groups
         self._group[BEFORE] = self._node.name
@@ -116,8 +119,11 @@ class Replacement:
         for name, socket in prepared.part.links.items():
             if source := self._source(socket):
                 tree.links.new(source, present[name])
-        for name in (pack.NORMAL, pack.TANGENT):
-            if name in node.inputs and (source := self._source(name)):
+        for name, source in (
+            (pack.NORMAL, self._vector("Normal")),
+            (pack.TANGENT, self._tangent()),
+        ):
+            if source is not None and name in present:
                 tree.links.new(source, present[name])
         if prepared.part.again:
             tree.links.new(self._again(prepared.part.again), present["again"])
@@ -229,23 +235,61 @@ class Replacement:
         value = shader_values.constant(self._node.inputs[name])
         socket.default_value = (*value, 1.0) if isinstance(value, tuple) else value
 
-    def _follow(self, factor, power, low, high):
-        """Nodes for factor * roughness^power, clamped to the range of the parameter."""
-        tree, group, source = self._tree, self._group, self._source("Roughness")
-        for i, (operation, *operands) in enumerate(
-            (
-                ("MAXIMUM", 1e-3),
-                ("POWER", power),
-                ("MULTIPLY", factor),
-                ("MAXIMUM", low),
-                ("MINIMUM", high),
-            )
-        ):
-            math_node = tree.nodes.new("ShaderNodeMath")
-            math_node.operation, math_node.hide = operation, True
-            math_node.location = (group.location.x - 200, group.location.y - 40 * i)
-            math_node[HELPS] = group.name
-            tree.links.new(source, math_node.inputs[0])
-            math_node.inputs[1].default_value = operands[0]
-            source = math_node.outputs[0]
-        return source
+    def _follow(self, factor, power, low, high, stretched):
+        """Nodes for a row of Part.widths."""
+        found = None
+        if power:
+            found = self._math("MAXIMUM", self._source("Roughness"), 1e-3)
+            found = self._math("POWER", found, power)
+        if stretched:
+            ratio = self._math("MULTIPLY_ADD", self._source(self._sockets[0]), RATIO, 1.0)
+            ratio = self._math("MINIMUM", self._math("MAXIMUM", ratio, 1 + RATIO), 1.0)
+            ratio = self._math("POWER", ratio, stretched)
+            found = self._math("MULTIPLY", found, ratio) if found else ratio
+        found = self._math("MAXIMUM", self._math("MULTIPLY", found, factor), low)
+        return self._math("MINIMUM", found, high)
+
+    def _math(self, operation, *operands):
+        """A Math node before the group."""
+        output = self._operation("ShaderNodeMath", operation, *operands)
+        output.node.location.x -= 440
+        return output
+
+    @property
+    def _sockets(self):
+        """The names of the node's sockets of anisotropy and rotation."""
+        return ANISOTROPY[KINDS[self._node.bl_idname]]
+
+    def _vector(self, name):
+        return self._source(name) if name in self._node.inputs else None
+
+    def _tangent(self):
+        """The tangent of the replaced node. Nodes without a link take that of a Tangent node."""
+        linked = self._vector("Tangent")
+        if not self._plan.anisotropic:
+            return linked
+        if self._turned is None:
+            self._turned = self._turn(linked or self._radial())
+        return self._turned
+
+    def _radial(self):
+        tangent = self._helper("ShaderNodeTangent")
+        tangent.direction_type, tangent.axis = "RADIAL", "Z"
+        return tangent.outputs[0]
+
+    def _turn(self, tangent):
+        """The tangent, turned about the normal."""
+        socket = self._node.inputs[self._sockets[1]]
+        linked, angle = self._source(socket.name), shader_values.constant(socket)
+        if not linked and not angle:
+            return tangent
+        rotate = self._helper("ShaderNodeVectorRotate")
+        axis = self._vector("Normal") or self._helper("ShaderNodeNewGeometry").outputs["Normal"]
+        self._tree.links.new(tangent, rotate.inputs["Vector"])
+        self._tree.links.new(axis, rotate.inputs["Axis"])
+        if linked:
+            turned = self._math("MULTIPLY", linked, math.tau)
+            self._tree.links.new(turned, rotate.inputs["Angle"])
+        else:
+            rotate.inputs["Angle"].default_value = math.tau * angle
+        return rotate.outputs[0]
