@@ -51,6 +51,7 @@ __all__ = [
     "add_library",
     "albedo",
     "bake",
+    "conversion_warning",
     "convert_back",
     "convert_materials",
     "enable_osl",
@@ -395,6 +396,13 @@ def convert_materials(plans):
     for material in dict.fromkeys(changed):
         prepare_material(material)
     return count
+
+
+def conversion_warning(plans, scene):
+    """What a setting of a scene changes about pictures of plan_conversion()'s plans: a sentence if
+    it has Filter Glossy, which models ignore, and pictures differ by more than 1 %; None if not."""
+    plans = argument_checks.each(functools.partial(argument_checks.plan, convert.Plan), plans)
+    return convert.warning(plans, argument_checks.scene(scene))
 
 
 def convert_back(material):

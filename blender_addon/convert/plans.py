@@ -14,6 +14,7 @@ from ..nearest.native_bsdf import Native
 from ..nearest.nearest_model import base_of, nearest, with_width
 from ..packs import device, pack
 from ..trees import shader_trees
+from .filter_glossy import is_filtered
 from .instances import Instances
 from .node_values import (
     ANISOTROPY,
@@ -82,6 +83,8 @@ class Plan(Part):
     transparent: bool = False
     #: Whether the models need the node's tangent: that of its link or Cycles' default one, turned.
     anisotropic: bool = False
+    #: Whether Filter Glossy blurs the node so that it shows, but not its model.
+    filtered: bool = False
     refusal: str = ""
     #: If the node is in a node group: the other materials that contain it, and the group's inputs
     #: that had an effect on the node and have none on its replacement.
@@ -139,6 +142,8 @@ class Plan(Part):
     def line(self):
         """What the node becomes, in words."""
         of = {"material": self.material.name, "node": Sentence(self.node.bl_label)}
+        if getattr(self.node, "node_tree", None) is not None:
+            of["node"] = self.node.node_tree.name
         tree = self.node.id_data
         if not tree.is_embedded_data:
             of["node"] = say("{node} in {group}", node=of["node"], group=tree.name)
@@ -267,6 +272,7 @@ def _plan_node(material, node, inputs):
         more |= {"material": material, "node": node}
         more |= {"error": max(errors), "least_error": min(errors)}
         more |= {"anisotropic": any(look["stretch"] != 1 for look in looks)}
+        more |= {"filtered": any(is_filtered(Native(**given, **look)) for look in looks)}
         return Plan(**vars(part), **more)
 
     if given["kind"] != "principled":
@@ -299,7 +305,8 @@ def _mixed(share, plain, metal):
 
 def plan(materials):
     """A Plan for each visible Diffuse, Glossy, Principled or Glass node of these materials, also of
-    those in node groups, once each. Refused are other reflecting nodes."""
+    those in node groups, once each. Refused are other reflecting nodes, and group nodes with one of
+    the four inside if their groups are linked from another file."""
     plans, instances = {}, Instances()
     for material in materials:
         for node in _convertible(material):
@@ -311,6 +318,8 @@ def plan(materials):
                     raise Refused(why)
                 if shader_trees.shading(material) is None:
                     raise Refused(shader_trees.NODES_OFF)
+                if getattr(node, "node_tree", None) is not None:
+                    raise Refused(editable.refusal(node.node_tree))
                 if node.bl_idname not in KINDS:
                     raise Refused(say("this extension has no model that is near"))
                 withins = [instance.within for instance in instances.of(node)]
@@ -351,12 +360,15 @@ def _group_inputs(socket):
 
 
 def _convertible(material):
-    """The nodes of a material for which there is a Plan, in the order of its trees."""
+    """The nodes of a material for which there is a Plan, in the order of its trees. In place of
+    nodes in a group that is linked from another file, the group node."""
     if material.node_tree is None:
         return []
-    found = {shown.node for shown in shader_trees.shown_by(material.node_tree)}
-    return [
-        node
-        for node in nodes.all_nodes(material)
-        if node in found and node.bl_idname not in STAYING and not nodes.is_ours(node)
-    ]
+    found = set()
+    for shown in shader_trees.shown_by(material.node_tree):
+        locked = (group for group in shown.within if not editable.keeps_changes(group.node_tree))
+        if (group := next(locked, None)) is not None:
+            found |= {group} if shown.node.bl_idname in KINDS else set()
+        elif shown.node.bl_idname not in STAYING and not nodes.is_ours(shown.node):
+            found.add(shown.node)
+    return [node for node in nodes.all_nodes(material) if node in found]
