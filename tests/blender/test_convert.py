@@ -580,6 +580,41 @@ def test_a_plan_changes_nothing_and_a_failure_neither(extension, convert, monkey
         assert not extension.nodes.group_nodes(material)
 
 
+def test_functions_take_one_of_several_models(extension, convert):
+    """As Convert makes them of a plastic."""
+    material, _ = material_of("principled", "GGX", Base_Color=GOLD, Roughness=0.4)
+    assert convert.apply(convert.plan([material])) == 1
+    gloss, base = extension.nodes.group_nodes(material)
+    api, several = (
+        extension.api,
+        "has 2 reflection models: expected node=, one of 'Group', 'Group.001'",
+    )
+    for call in (api.get_parameters, api.set_parameters, api.add_albedo):
+        with pytest.raises(ValueError, match=several):
+            call(material)
+    with pytest.raises(ValueError, match=several):
+        api.set_substance(material, "gold")
+    assert api.get_parameters(material, node=base.name)["rho"] == pytest.approx(GOLD)
+    assert api.get_parameters(material, node=gloss)["ax"] == pytest.approx(0.16)
+    api.set_parameters(material, node=base.name, rho=0.25)
+    assert api.get_parameters(material, node=base)["rho"] == (0.25, 0.25, 0.25)
+    with pytest.raises(ValueError, match="has no model node 'Lambert', only Group, Group.001"):
+        api.get_parameters(material, node="Lambert")
+    other = api.new_material("lambert")
+    with pytest.raises(ValueError, match="is no model of material"):
+        api.get_parameters(material, node=extension.nodes.group_nodes(other)[0])
+    api.add_albedo(material, node=base.name)
+    assert "Albedo" in base.outputs and "Albedo" not in gloss.outputs
+    assert "f0" in api.set_substance(material, "gold", node=gloss.name)
+    # Forms are those of all, if none is named.
+    api.switch_representation(material, "sampled")
+    assert [extension.nodes.identity(n)[1] for n in (gloss, base)] == ["sampled", "sampled"]
+    api.switch_representation(material, "exact", node=base.name)
+    with pytest.raises(ValueError, match="no render method 'exact'"):
+        api.switch_representation(material, "exact")
+    assert [extension.nodes.identity(n)[1] for n in (gloss, base)] == ["sampled", "exact"]
+
+
 # ---- what Blender ignores ------------------------------------------------------------------------
 
 
