@@ -237,6 +237,34 @@ def test_buttons_find_the_nodes_of_groups(extension, convert, empty):
     assert extension.nodes.identity(outside)[1] != "sampled"
 
 
+def test_panel_lamps_and_lists_know_the_models_of_groups(extension, convert, empty):
+    tree, _ = group_of("principled", inputs=["Base Color"], Metallic=1.0, Roughness=0.3)
+    users = [user_of(tree, name, Base_Color=RED)[0] for name in ("Car", "Bike")]
+    for user in users:
+        helpers.add_sphere(empty, user)
+    helpers.add_lamp(empty, "POINT", "Bulb", location=(2, -2, 3), shadow_soft_size=0.1)
+    extension.api.enable_osl(empty)
+    assert extension.api.convert_materials(extension.api.plan_conversion(users)) == 1
+    (node,) = models_in(extension, tree)
+    assert [lamp.slot for lamp in extension.api.see_lamps(empty)] == [1]
+    for user in users:
+        layout = helpers.Layout()
+        extension.ui.draw_material(layout, user, empty)
+        assert any("Free of noise under Bulb" in line for line in layout.log)
+        assert any(line.startswith("operator brdfc.convert_back") for line in layout.log)
+        assert extension.api.get_parameters(user)["ax"] == pytest.approx(0.09)
+        entry = extension.api.used_materials()[user.name]
+        assert entry["model"] == "microfacet" and entry["parameters"]["f0"] == {"varies": True}
+    empty.cycles.use_guiding = True
+    codes = [[found.code for found in extension.api.warnings(m, empty)] for m in users]
+    assert codes[0] == codes[1] and "path_guiding" in codes[0]
+    # A parameter of both.
+    extension.api.set_parameters(users[0], ax=0.2)
+    assert extension.api.get_parameters(users[1])["ax"] == pytest.approx(0.2)
+    copy = users[0].copy()
+    assert extension.nodes.group_nodes(copy) == [node]
+
+
 def test_a_group_of_a_library_stays_and_is_said(extension, convert, tmp_path):
     tree, _ = group_of("principled")
     tree.use_fake_user = True
