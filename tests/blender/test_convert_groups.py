@@ -311,3 +311,51 @@ def test_a_saved_file_has_the_models_of_a_group(extension, convert, empty, tmp_p
         assert np.array(flat(scene, material)) == pytest.approx(before, rel=0.02, abs=0.005)
     assert extension.api.convert_back(material) == 1
     assert np.array(flat(scene, material)) == pytest.approx(before, rel=1e-3)
+
+
+def test_a_lean_group_is_that_of_all_materials(extension, convert, empty, by_the_tool):
+    """The plan lists the model for each material; it is baked once."""
+    tree, _ = group_of("principled", inputs=["Base Color"], Metallic=1.0, Roughness=0.3)
+    users = [user_of(tree, name, Base_Color=RED)[0] for name in ("Car", "Bike")]
+    extension.api.enable_osl(empty)
+    assert extension.api.convert_materials(extension.api.plan_conversion(users)) == 1
+    (node,) = models_in(extension, tree)
+    plan = extension.api.plan()
+    assert set(plan.materials) == {"Car", "Bike"}
+    assert extension.api.bake(plan) == 1 and extension.nodes.is_baked(node)
+    assert extension.api.convert_back(users[1]) == 1 and not models_in(extension, tree)
+
+
+def test_a_linked_material_with_a_converted_group_becomes_local(
+    extension, convert, empty, tmp_path
+):
+    tree, _ = group_of("principled", inputs=["Base Color"], Metallic=1.0, Roughness=0.3)
+    material, _ = user_of(tree, "Car", Base_Color=RED)
+    before = np.array(flat(empty, material))
+    assert extension.api.convert_materials(extension.api.plan_conversion([material])) == 1
+    path = str(tmp_path / "car.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    extension.scene_loader.apply_clean_settings(scene)
+    with bpy.data.libraries.load(path, link=True) as (_, wanted):
+        wanted.materials = ["Car"]
+    (linked,) = wanted.materials
+    with pytest.raises(ValueError, match="Make Local first"):
+        extension.api.convert_back(linked)
+    local = extension.api.make_local(linked)
+    for osl in (False, True):
+        scene.cycles.shading_system = osl
+        extension.api.follow_settings(scene)
+        (node,) = extension.nodes.group_nodes(local)
+        assert node.id_data.library is None and node.node_tree.library is None
+        assert extension.nodes.runs_anywhere(node) != osl
+        codes = {found.code for found in extension.api.scene_warnings(scene)}
+        assert not codes
+        assert np.array(flat(scene, local)) == pytest.approx(before, rel=0.02, abs=0.005)
+    scene.render.engine = "BLENDER_WORKBENCH"
+    assert "engine" in {found.code for found in extension.api.scene_warnings(scene)}
+    scene.render.engine = "CYCLES"
+    assert extension.api.convert_back(local) == 1
+    assert np.array(flat(scene, local)) == pytest.approx(before, rel=1e-3)
