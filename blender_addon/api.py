@@ -626,7 +626,8 @@ def make_local(material):
     keep the linked one."""
     argument_checks.material(material)
     material = editable.local(material)
-    nodes.make_local(material.node_tree)
+    if material.node_tree is not None:
+        nodes.make_local(material.node_tree)
     lamps.follow()
     automatic.follow()
     nodes.merge_duplicates(

@@ -223,6 +223,14 @@ class Inputs:
                 raise Refused(say("it has {what}", what=Sentence(setting.name)))
 
 
+def check_off(inputs, but=()):
+    """Raises Refused if a Principled node has an effect that no model offers, except those of the
+    sockets `but`."""
+    for name, (off, what) in _OFF.items():
+        if name not in but and inputs.value(name, off) != off:
+            raise Refused(say("it has {what}", what=Sentence(what)))
+
+
 def given_of(node, inputs):
     """What all Natives of a node have in common, and what they differ in."""
     kind = KINDS[node.bl_idname]
@@ -237,9 +245,7 @@ def given_of(node, inputs):
         given["beckmann"] = distribution == "BECKMANN"
         given["multiscatter"] = distribution == "MULTI_GGX"
     if kind == "principled":
-        for name, (off, what) in _OFF.items():
-            if inputs.value(name, off) != off:
-                raise Refused(say("it has {what}", what=Sentence(what)))
+        check_off(inputs)
         level, ior = inputs.value("Specular IOR Level"), inputs.value("IOR")
         given["f0"] = min(((ior - 1) / (ior + 1)) ** 2 * 2 * level, 0.9)
         metallic = 0.5 if (known := inputs.mean("Metallic")) is None else known

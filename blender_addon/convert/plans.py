@@ -23,6 +23,7 @@ from .node_values import (
     STAYING,
     Inputs,
     Refused,
+    check_off,
     color_of,
     effective_sockets,
     given_of,
@@ -183,11 +184,42 @@ def _plan_glass(material, node, inputs):
         raise Refused(say("it has {what}", what=Sentence("Thin Film")))
     # Blender's glass tints both reflected and transmitted light.
     error = sum(abs(1 - c) for c in color) / max(sum(color), 1e-6)
+    return _glass_of(material, node, inputs, error)
+
+
+def _is_clear(inputs):
+    """Whether a Principled node transmits all light that enters it, as glass does."""
+    name = "Transmission Weight"
+    return name in inputs and inputs.constant(name) == 1 and inputs.constant("Metallic") == 0
+
+
+def _plan_clear(material, node, inputs):
+    """The Plan for a Principled node that is smooth glass."""
+    inputs.setting("mute")
+    inputs.check_unknown(KNOWN_SOCKETS["principled"])
+    check_off(inputs, but={"Transmission Weight"})
+    if inputs.value("Roughness") > 1e-3:
+        raise Refused(say("no model is of rough glass"))
+    if inputs.value("Specular IOR Level") != 0.5:
+        raise Refused(say("it has {what}", what=Sentence("Specular IOR Level")))
+    if inputs.value("Specular Tint", (1.0, 1.0, 1.0)) != (1, 1, 1):
+        raise Refused(say("it has {what}", what=Sentence("Specular Tint")))
+    # Such a node tints the transmitted light alone.
+    tint = [min(max(c, 0.0), 1.0) ** 0.5 for c in inputs.value("Base Color")]
+    ior = inputs.mean("IOR") or 1.5
+    mirrored = native_bsdf.mean_dielectric(((ior - 1) / (ior + 1)) ** 2)
+    light = 3 * mirrored + (1 - mirrored) * sum(tint)
+    error = (1 - mirrored) * (3 - sum(tint)) / max(light, 1e-6)
+    more = {"glows": glows(inputs), "transparent": is_transparent(inputs)}
+    return _glass_of(material, node, inputs, error, **more)
+
+
+def _glass_of(material, node, inputs, error, **more):
     values = {} if inputs.follows("IOR") else {"ior": inputs.constant("IOR")}
     links = {"ior": "IOR"}
     part = Part("fresnel_dielectric", values, links)
     found = {"material": material, "node": node, "error": error, "least_error": error}
-    return Plan(**vars(part), **found)
+    return Plan(**vars(part), **found, **more)
 
 
 @functools.cache
@@ -248,6 +280,8 @@ def _part(inputs, native, fit):
 def _plan_node(material, node, inputs):
     if KINDS[node.bl_idname] == "glass":
         return _plan_glass(material, node, inputs)
+    if KINDS[node.bl_idname] == "principled" and _is_clear(inputs):
+        return _plan_clear(material, node, inputs)
     given, looks = given_of(node, inputs)
     color = color_of(given["kind"])
     _, colors = inputs.colors(color)
