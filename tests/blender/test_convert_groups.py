@@ -359,3 +359,40 @@ def test_a_linked_material_with_a_converted_group_becomes_local(
     scene.render.engine = "CYCLES"
     assert extension.api.convert_back(local) == 1
     assert np.array(flat(scene, local)) == pytest.approx(before, rel=1e-3)
+
+
+def test_a_row_names_some_of_many_materials(convert):
+    tree, _ = group_of("diffuse")
+    users = [user_of(tree, f"M{i}")[0] for i in range(9)]
+    plan = only(convert.plan(users))
+    assert plan.line().endswith(". It changes M1, M2, M3, M4, M5, M6 and 2 more too")
+    assert plan.materials == tuple(users)
+
+
+def test_a_group_is_one_step_of_undo(extension, convert, empty):
+    tree, node = group_of("principled", inputs=["Base Color"], Metallic=1.0)
+    keyed(node.inputs["Roughness"])
+    material, _ = user_of(tree, "Car", Base_Color=RED)
+    ball = helpers.add_sphere(empty, material)
+    ball.select_set(True)
+    bpy.context.view_layer.objects.active = ball
+
+    def state():
+        tree = bpy.data.node_groups["Paint"]
+        curve = tree.animation_data.action.layers[0].strips[0].channelbags[0].fcurves[0]
+        shader = next(n for n in tree.nodes if n.bl_idname == "NodeGroupOutput").inputs[0]
+        return curve.data_path, shader.links[0].from_node.bl_idname
+
+    bpy.ops.ed.undo_push(message="Start")
+    start = state()
+    assert bpy.ops.brdfc.convert() == {"FINISHED"}
+    bpy.ops.ed.undo_push(message="Convert")
+    converted = state()
+    assert converted[0] != start[0] and converted[1] == "ShaderNodeGroup"
+    assert bpy.ops.ed.undo() == {"FINISHED"}
+    assert state() == start
+    assert bpy.ops.ed.redo() == {"FINISHED"}
+    assert state() == converted
+    bpy.ops.ed.undo_push(message="Again")
+    assert bpy.ops.brdfc.convert_back() == {"FINISHED"}
+    assert state() == start
