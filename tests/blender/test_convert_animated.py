@@ -75,6 +75,7 @@ def a_strip(node):
 CHANGES = [color_of_metal, roughness, metallic, alpha_and_emission, a_driver, a_strip]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distribution", ["GGX", "MULTI_GGX"])
 @pytest.mark.parametrize("change", CHANGES)
 def test_pictures_of_what_is_animated_are_as_before(
@@ -122,6 +123,7 @@ def test_glass_keeps_the_keys_of_its_index(extension, convert):
     assert [len(points) for points in curves(material.node_tree).values()] == [2]
 
 
+@pytest.mark.slow
 def test_an_action_of_two_materials_becomes_two(extension, convert, empty):
     """A copy of a material shares its action: the copy that is not converted keeps its own."""
     material, node = material_of("principled", "GGX", Metallic=1.0)
@@ -183,6 +185,7 @@ def test_keys_in_a_group_move_too(extension, convert):
     assert curves(tree) == before
 
 
+@pytest.mark.slow
 def test_a_saved_file_moves_without_the_extension(extension, convert, empty, tmp_path):
     material, node = material_of("principled", "GGX", Base_Color=RED[:3])
     roughness(node)

@@ -85,6 +85,7 @@ def test_a_node_in_a_group_is_converted_for_all_materials(extension, convert):
     assert not [g for g in bpy.data.node_groups if extension.nodes.TAG in g]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("osl", [False, True])
 @pytest.mark.parametrize("distribution", ["GGX", "MULTI_GGX"])
 def test_pictures_of_a_group_are_as_before(extension, convert, empty, distribution, osl):
@@ -116,13 +117,17 @@ def test_pictures_of_a_group_are_as_before(extension, convert, empty, distributi
     )
 
 
-ROUGH = ("diffuse", "Color", {"Roughness": 0.5}), ("nodes", "aimed", "sampled", "fitted", "twin")
-METAL = ("principled", "Base Color", {"Metallic": 1.0, "Roughness": 0.5})
-FORMS = [(*ROUGH[0], form) for form in ROUGH[1]] + [
-    (*METAL, form) for form in ("nodes", "aimed", "sampled")
+METAL = {"Metallic": 1.0, "Roughness": 0.5}
+FORMS = [
+    *(
+        ("diffuse", "Color", {"Roughness": 0.5}, form)
+        for form in ("nodes", "aimed", "sampled", "fitted", "twin")
+    ),
+    *(("principled", "Base Color", METAL, form) for form in ("nodes", "aimed", "sampled")),
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "color", "values", "form"), FORMS)
 def test_every_form_works_in_a_group(extension, convert, empty, kind, color, values, form):
     """With a normal and a colour that inputs of the group control, the normal without a link: as
