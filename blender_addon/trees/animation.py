@@ -96,7 +96,7 @@ def capture(node):
 
 def move(pairs):
     """Moves what animates the values of sockets, curves and drivers, also muted ones, to other
-    sockets of the same tree. `pairs`: [(from, to)]."""
+    sockets of the same tree, whose drivers then read the values there. `pairs`: [(from, to)]."""
     if not pairs:
         return
     tree, wanted = pairs[0][0].id_data, {a.as_pointer(): b for a, b in pairs}
@@ -112,12 +112,34 @@ def move(pairs):
         _make_all_own(tree)
     for target in found():
         retarget(*target)
+    _redirect_readers(tree, wanted)
+
+
+def _redirect_readers(tree, moved):
+    """Drivers of a tree that read the value of a socket read it where it has been moved to."""
+    owners = _owners(tree)
+    drivers = [c.driver for o in owners if o.animation_data for c in o.animation_data.drivers]
+    for target in (t for driver in drivers for v in driver.variables for t in v.targets):
+        place, _, name = target.data_path.rpartition(".")
+        name, bracket, index = name.partition("[")
+        if target.id not in owners or name != _VALUE:
+            continue
+        try:
+            found = target.id.path_resolve(place)
+        except ValueError:  # the node or socket no longer exists
+            continue
+        if (socket := moved.get(found.as_pointer())) is not None:
+            target.data_path = _path(target.id, socket) + bracket + index
+
+
+def _path(owner, socket):
+    """The path from a data-block, a tree or its material, to the value of a socket."""
+    return ("" if owner == socket.id_data else "node_tree.") + socket.path_from_id(_VALUE)
 
 
 def retarget(curve, owner, socket):
     """Redirects a curve or driver to a socket of a tree."""
-    prefix = "" if owner == socket.id_data else "node_tree."
-    curve.data_path = prefix + socket.path_from_id(_VALUE)
+    curve.data_path = _path(owner, socket)
 
 
 def _make_all_own(tree):

@@ -159,6 +159,33 @@ def test_keys_of_a_material_itself_move_as_well(extension, convert):
     )
 
 
+def test_a_driver_that_reads_what_moves_reads_it_at_its_new_place(extension, convert, empty):
+    """One of the same nodes; and back."""
+    material, node = material_of("principled", "GGX", Metallic=1.0)
+    helpers.add_sphere(empty, material)  # so that Blender evaluates it
+    tree = material.node_tree
+    keys(node.inputs["Base Color"], RED, BLUE)
+    reader = tree.nodes.new("ShaderNodeValue").outputs[0]
+    driver = reader.driver_add("default_value").driver
+    driver.type = "AVERAGE"
+    target = driver.variables.new().targets[0]
+    target.id_type, target.id = "MATERIAL", material
+    path = node.inputs["Base Color"].path_from_id("default_value")
+    target.data_path = before = f"node_tree.{path}[2]"
+
+    def seen(frame):
+        empty.frame_set(frame)
+        return reader.default_value
+
+    assert [seen(1), seen(11)] == pytest.approx([RED[2], BLUE[2]])
+    assert convert.apply(convert.plan([material])) == 1
+    assert target.data_path != before
+    assert [seen(1), seen(11)] == pytest.approx([RED[2], BLUE[2]])
+    assert convert.restore(material) == 1
+    assert target.data_path == before
+    assert [seen(1), seen(11)] == pytest.approx([RED[2], BLUE[2]])
+
+
 def test_what_is_animated_without_a_node_behind_it_is_a_reason(extension, convert):
     """The output of a group of the user's whose value has keys inside the group."""
     tree = bpy.data.node_groups.new("Number", "ShaderNodeTree")
