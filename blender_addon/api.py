@@ -51,6 +51,7 @@ __all__ = [
     "add_library",
     "albedo",
     "bake",
+    "conversion_warning",
     "convert_back",
     "convert_materials",
     "enable_osl",
@@ -233,27 +234,42 @@ def new_sum(lobes, representation="auto", name="Sum"):
     return material
 
 
-def _the_node(material):
-    """The only model node of a material."""
+def _the_node(material, node=None):
+    """A model node of a material: its only one, or the one that `node` is or names."""
     argument_checks.material(material)
+    if isinstance(node, str):
+        return nodes.named(material, node)
     ours = nodes.group_nodes(material)
-    if len(ours) != 1:
+    if node is not None and argument_checks.node(node) in ours:
+        return node
+    if node is None and len(ours) == 1:
+        return ours[0]
+    of = {"material": material.name, "count": len(ours)}
+    if node is not None:
         raise ValueError(
-            say(
-                "Material {material!r} has {count} reflection models, expected one",
-                material=material.name,
-                count=len(ours),
-            )
+            say("Node {node!r} is no model of material {material!r}", node=node.name, **of)
         )
-    return ours[0]
+    if not ours:
+        raise ValueError(
+            say("Material {material!r} has {count} reflection models, expected one", **of)
+        )
+    raise ValueError(
+        say(
+            "Material {material!r} has {count} reflection models: expected node=, one of {names}",
+            **of,
+            names=", ".join(repr(nodes.key(n)) for n in ours),
+        )
+    )
 
 
-def set_parameters(material, **parameters):
-    """Sets parameters of a material with one model. All values are checked before any is changed.
+def set_parameters(material, node=None, **parameters):
+    """Sets parameters of a material with one model, or of the one that `node` names. All values are
+    checked before any is changed.
 
     Raises ValueError as new_material does, and for a parameter that a link controls.
     """
-    _set(_the_node(material), say("material {name!r}", name=material.name), parameters)
+    found = _the_node(material, node)
+    _set(found, say("material {name!r}", name=material.name), parameters)
 
 
 def _set(node, what, parameters):
@@ -303,10 +319,10 @@ def set_kernel(group, curve):
 def set_substance(material, substance, node=None, thickness=None):
     """Gives a material the parameters of a metal, glass or liquid with measured refractive index.
 
-    The material must have one model, or `node` names the model node. The values are in the working
-    space of the file: n and k by channel, or the colour reflected at normal incidence, whichever
-    parameters the model has, and the absorption inside, which is exact at `thickness` metres (0.01
-    by default). All other parameters keep their values.
+    The material must have one model, or `node` is or names one of its model nodes. The values are
+    in the working space of the file: n and k by channel, or the colour reflected at normal
+    incidence, whichever parameters the model has, and the absorption inside, which is exact at
+    `thickness` metres (0.01 by default). All other parameters keep their values.
 
     `substance`: one of substances(), or a file NAME.csv as refractiveindex.info exports it. Returns
     the parameters that were set, and prints the assumptions made about a file. Raises ValueError
@@ -316,7 +332,7 @@ def set_substance(material, substance, node=None, thickness=None):
     """
     from .packs import optical
 
-    node = _the_node(material) if node is None else argument_checks.node(node)
+    node = _the_node(material, node)
     found = optical.find(substance)
     values = optical.parameters(nodes.identity(node)[0], found, thickness)
     for note in found.notes:
@@ -332,18 +348,30 @@ def substances():
     return optics.substances()
 
 
-def get_parameters(material):
-    """The parameter values of a material with one model, except those that a link controls."""
-    node = _the_node(material)
+def get_parameters(material, node=None):
+    """The parameter values of a material with one model, or of the one that `node` names, except
+    those that a link controls."""
+    node = _the_node(material, node)
     model_name, _ = nodes.identity(node)
     values = {name: nodes.get_value(node, name) for name in pack.parameters(model_name)}
     return {name: value for name, value in values.items() if value is not None}
 
 
-def switch_representation(material, representation):
-    """Changes the form of a material with one model; values and links stay."""
-    nodes.switch(_the_node(material), representation)
-    prepare_material(material)
+def switch_representation(material, representation, node=None):
+    """Changes the form of the models of a material, or of the one that `node` names; values and
+    links stay. Raises ValueError, with all models as they were, if one of them lacks the form."""
+    argument_checks.material(material)
+    several = node is None and len(nodes.group_nodes(material)) > 1
+    chosen = nodes.group_nodes(material) if several else [_the_node(material, node)]
+    for one in chosen:
+        editable.check(one.id_data)
+        if representation != "auto":
+            pack.resolve(nodes.identity(one)[0], representation, nodes.constants(one))
+    for one in chosen:
+        nodes.switch(one, representation)
+    for tree in dict.fromkeys(one.id_data for one in chosen):
+        for user in nodes.users_of(tree):
+            prepare_material(user)
 
 
 def _prepare_all():
@@ -365,7 +393,8 @@ def update_materials():
 
 
 def plan_conversion(materials, limit=convert.LIMIT):
-    """Finds the nearest model for each visible Diffuse, Glossy, Principled or Glass node.
+    """Finds the nearest model for each visible Diffuse, Glossy, Principled or Glass node, also of
+    those in node groups, whose plans name the `others`, the materials that change as well.
 
     Returns [convert.Plan]; line() describes a plan in words. A plan has the model, its values and
     the fraction of the light that the replacement misplaces; or, where no model comes within
@@ -388,27 +417,36 @@ def convert_materials(plans):
     """
     plans = argument_checks.each(functools.partial(argument_checks.plan, convert.Plan), plans)
     count = convert.apply(plans)
-    for plan_ in plans:
-        if not plan_.refusal:
-            prepare_material(plan_.material)
+    changed = (material for plan_ in plans if not plan_.refusal for material in plan_.materials)
+    for material in dict.fromkeys(changed):
+        prepare_material(material)
     return count
 
 
+def conversion_warning(plans, scene):
+    """What a setting of a scene changes about pictures of plan_conversion()'s plans: a sentence if
+    it has Filter Glossy, which models ignore, and pictures differ by more than 1 %; None if not."""
+    plans = argument_checks.each(functools.partial(argument_checks.plan, convert.Plan), plans)
+    return convert.warning(plans, argument_checks.scene(scene))
+
+
 def convert_back(material):
-    """Restores the original nodes; where they were deleted, uses the model's twin instead.
+    """Restores the original nodes; where they were deleted, uses the model's twin instead. Nodes in
+    node groups are restored for all materials that use the groups.
 
     Returns the number of nodes restored. Raises ValueError where there is neither."""
     return convert.restore(argument_checks.material(material))
 
 
-def add_albedo(material):
-    """Adds the Albedo output to the node of a material with one model.
+def add_albedo(material, node=None):
+    """Adds the Albedo output to the node of a material with one model, or to the one that `node`
+    names.
 
     The output is the fraction of a uniform white environment's light that the surface reflects.
     Models whose albedo needs large tables are added without it, to keep files small. Raises
     ValueError for a lean node, and for one made by another version of the extension.
     """
-    nodes.add_albedo(_the_node(material))
+    nodes.add_albedo(_the_node(material, node))
 
 
 def add_library():
@@ -588,7 +626,8 @@ def make_local(material):
     keep the linked one."""
     argument_checks.material(material)
     material = editable.local(material)
-    nodes.make_local(material.node_tree)
+    if material.node_tree is not None:
+        nodes.make_local(material.node_tree)
     lamps.follow()
     automatic.follow()
     nodes.merge_duplicates(

@@ -215,7 +215,7 @@ class Baking(Job):
             nodes.replace_group(node, groups[name])
         nodes.remove_unused_groups()
         self._afterwards()
-        self.result = sum(map(nodes.is_baked, found.values()))
+        self.result = sum(map(nodes.is_baked, dict.fromkeys(found.values())))
 
     def _group(self, entry, albedo, before):
         with _taken(self._plan.pack):

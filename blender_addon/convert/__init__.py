@@ -5,6 +5,7 @@ Nothing is changed before apply().
 """
 
 from .apply_restore import apply, is_converted, restore
+from .filter_glossy import warning
 from .node_values import KNOWN_SOCKETS, natives
 from .plans import LIMIT, Plan, plan
 
@@ -17,4 +18,5 @@ __all__ = [
     "natives",
     "plan",
     "restore",
+    "warning",
 ]

@@ -7,15 +7,21 @@ import functools
 import bpy
 
 from ..common.i18n import Sentence, say
+from ..nearest import native_bsdf
 from ..nearest.native_bsdf import Native
 from ..trees import animation, shader_trees, shader_values
 
-#: The roughnesses at which a model is fitted when a texture provides the roughness.
+#: The roughnesses and anisotropies at which a model is fitted when a texture provides them; and in
+#: which pairs, if it provides both.
 ROUGHNESSES = (0.2, 0.5, 0.8)
+_ANISOTROPIES = (0.5, 0.8, 0.2)
 #: Colour at which the width is fitted if the linked colour is unknown.
 GREY = (0.5, 0.5, 0.5)
 #: Such a colour may lie anywhere between these: a plan's error is then a range.
 DARK, BRIGHT = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+#: If the instances of a node have more colours, the error is computed for the darkest and the
+#: brightest.
+_MOST_COLORS = 4
 
 KINDS = {
     "ShaderNodeBsdfDiffuse": "diffuse",
@@ -69,6 +75,19 @@ _KNOWN_SETTINGS = {"distribution", "subsurface_method"}
 _OFTEN_ONE_COLOR = {"Alpha", "Base Color", "Color", "Emission Color", "Metallic"}
 
 
+#: Sockets of these effects do nothing while the effect is off.
+_WITHOUT_EFFECT = ("Weight", "Subsurface ", "Coat ", "Sheen ", "Thin Film ")
+
+
+def effective_sockets(node):
+    """The sockets of a convertible node that do something, or would if they had another value."""
+    return [
+        socket
+        for socket in node.inputs
+        if socket.enabled and (socket.name in _OFF or not socket.name.startswith(_WITHOUT_EFFECT))
+    ]
+
+
 class Refused(ValueError):
     """Why a node is not converted, in a few words."""
 
@@ -88,58 +107,95 @@ def _held(socket):
     return tuple(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
 
 
-class Inputs:
-    """The values of a node's sockets. Raises Refused if one varies in a way that no model can
-    follow."""
+def has_own_animation(socket, animated):
+    """Whether a socket takes its own value, which is animated; `animated`: the properties of its
+    node that are."""
+    if animation.value_key(socket) not in animated:
+        return False
+    reached = shader_trees.reach(socket)
+    return reached.output is None and reached.holder == socket
 
-    def __init__(self, node):
+
+class Inputs:
+    """The values of a node's sockets, which have to hold within all of its instances: `withins` as
+    for shader_trees.reach(). Raises Refused if one varies in a way that no model can follow."""
+
+    def __init__(self, node, withins=((),)):
         self._node, self._animated = node, animation.animated_properties(node)
+        self._withins = withins
         self._values = shader_values.Constants(), shader_values.Constants(images=True)
         self._found = {}
 
     def __contains__(self, name):
         return name in self._node.inputs
 
+    def moves(self, name):
+        """Whether a socket has a value of its own that is animated or driven: it can be moved."""
+        return name in self and has_own_animation(self._node.inputs[name], self._animated)
+
     def reaches(self, name):
-        """Whether the output of a node reaches a socket; such a link can be kept."""
-        return shader_trees.is_driven(self._node.inputs[name])
+        """Whether the output of a node, or an animation, controls a socket; either can be kept."""
+        return shader_trees.is_driven(self._node.inputs[name]) or self.moves(name)
+
+    def is_same_everywhere(self, name):
+        """Whether a link reaches a socket in all instances of the node, or in none as it has no
+        link."""
+        socket = self._node.inputs[name]
+        if not shader_trees.is_driven(socket):
+            return True
+        return all(shader_trees.reach(socket, w).output is not None for w in self._withins)
 
     def constant(self, name):
         """The value of a socket, also through links; None if it is not constant."""
         if name not in self._found:
-            values = self._values[name in _OFTEN_ONE_COLOR]
-            self._found[name] = values.told(self._node.inputs[name])
+            values, socket = self._values[name in _OFTEN_ONE_COLOR], self._node.inputs[name]
+            told = {values.told(socket, within) for within in self._withins}
+            self._found[name] = told.pop() if len(told) == 1 else None
         return self._found[name]
 
+    def means(self, name):
+        """The distinct values, or their means over images; None if one of them is unknown."""
+        if (known := self.constant(name)) is not None:
+            return [known]
+        socket = self._node.inputs[name]
+        found = dict.fromkeys(shader_values.mean(socket, within) for within in self._withins)
+        return None if None in found else list(found)
+
     def mean(self, name):
-        """The value, or its mean over images; None if neither is known."""
-        known = self.constant(name)
-        return shader_values.mean(self._node.inputs[name]) if known is None else known
+        """The mean of these; None if one of them is unknown."""
+        found = self.means(name)
+        if found is None or not isinstance(found[0], tuple):
+            return found and sum(found) / len(found)
+        return tuple(sum(channel) / len(found) for channel in zip(*found, strict=True))
 
     def follows(self, name):
-        """Whether a socket is linked to a value that varies. An animated socket raises Refused, as
-        the animation would end with the node."""
-        if self.constant(name) is not None:
-            return False
-        if self.reaches(name):
-            return True
-        raise Refused(say("{socket} is animated", socket=Sentence(name)))
+        """Whether a socket has a value that varies, linked or animated. Raises Refused if something
+        behind its link is animated that Cycles passes over."""
+        if self.constant(name) is None and not self.reaches(name):
+            raise Refused(say("{socket} is animated", socket=Sentence(name)))
+        return self.constant(name) is None
 
     def value(self, name, default=0.0):
         """The value of a socket that has to be constant."""
         if name not in self:
             return default
         if self.follows(name):
-            raise Refused(say("{socket} is linked", socket=Sentence(name)))
+            what = Sentence(name)
+            if self.moves(name):
+                raise Refused(say("{socket} is animated", socket=what))
+            raise Refused(say("{socket} is linked", socket=what))
         return self.constant(name)
 
     def colors(self, name):
         """The colour for which a model is fitted, and the colours for which its error is
         computed."""
-        if self.follows(name) and (known := self.mean(name)) is None:
+        if self.follows(name) and self.means(name) is None:
             return GREY, (DARK, BRIGHT)
-        known = tuple(max(c, 0.0) for c in self.mean(name))
-        return known, (known,)
+        known = [tuple(max(c, 0.0) for c in color) for color in self.means(name)]
+        if len(known) > _MOST_COLORS:
+            known.sort(key=sum)
+            known = [known[0], known[-1]]
+        return tuple(max(c, 0.0) for c in self.mean(name)), tuple(known)
 
     def setting(self, name):
         """A setting of the node itself."""
@@ -167,8 +223,16 @@ class Inputs:
                 raise Refused(say("it has {what}", what=Sentence(setting.name)))
 
 
+def check_off(inputs, but=()):
+    """Raises Refused if a Principled node has an effect that no model offers, except those of the
+    sockets `but`."""
+    for name, (off, what) in _OFF.items():
+        if name not in but and inputs.value(name, off) != off:
+            raise Refused(say("it has {what}", what=Sentence(what)))
+
+
 def given_of(node, inputs):
-    """What all Natives of a node have in common, and their roughnesses."""
+    """What all Natives of a node have in common, and what they differ in."""
     kind = KINDS[node.bl_idname]
     inputs.setting("mute")
     inputs.check_unknown(KNOWN_SOCKETS[kind])
@@ -180,11 +244,8 @@ def given_of(node, inputs):
             raise Refused(say("its distribution is {kind}", kind=Sentence(name)))
         given["beckmann"] = distribution == "BECKMANN"
         given["multiscatter"] = distribution == "MULTI_GGX"
-        given["stretch"] = _stretch(inputs, kind)
     if kind == "principled":
-        for name, (off, what) in _OFF.items():
-            if inputs.value(name, off) != off:
-                raise Refused(say("it has {what}", what=Sentence(what)))
+        check_off(inputs)
         level, ior = inputs.value("Specular IOR Level"), inputs.value("IOR")
         given["f0"] = min(((ior - 1) / (ior + 1)) ** 2 * 2 * level, 0.9)
         metallic = 0.5 if (known := inputs.mean("Metallic")) is None else known
@@ -195,8 +256,20 @@ def given_of(node, inputs):
         given["tint"] = tuple(min(max(c, 0.0), 1.0) for c in tint)
         given["diffuse_roughness"] = inputs.value("Diffuse Roughness")
     if inputs.follows("Roughness"):
-        return given, ROUGHNESSES
-    return given, (min(max(inputs.value("Roughness"), 0.0), 1.0),)
+        roughnesses = ROUGHNESSES
+    else:
+        roughnesses = (min(max(inputs.value("Roughness"), 0.0), 1.0),)
+    stretches = (1.0,)
+    if kind in ("glossy", "principled") and not is_mirror(roughnesses):
+        stretches = _stretches(inputs, kind)
+    count = max(len(roughnesses), len(stretches))
+    pairs = ((roughnesses * count)[:count], (stretches * count)[:count])
+    return given, [{"roughness": r, "stretch": s} for r, s in zip(*pairs, strict=True)]
+
+
+def is_mirror(roughnesses):
+    """Whether these roughnesses are that of a mirror alone."""
+    return max(roughnesses) < native_bsdf.SMOOTH
 
 
 def color_of(kind):
@@ -204,23 +277,42 @@ def color_of(kind):
 
 
 def natives(node):
-    """The node as Natives: one, or several roughnesses if the roughness is linked. Raises
+    """The node as Natives: one, or several if roughness or anisotropy are linked. Raises
     Refused."""
-    given, roughnesses = given_of(node, Inputs(node))
-    return [Native(**given, roughness=r) for r in roughnesses]
+    given, looks = given_of(node, Inputs(node))
+    return [Native(**given, **look) for look in looks]
 
 
-def _stretch(inputs, kind):
-    """Ratio of the lobe's width along the tangent to that across it."""
-    a = inputs.value("Anisotropic" if kind == "principled" else "Anisotropy")
-    if a == 0:
-        return 1.0
-    turn = inputs.value("Anisotropic Rotation" if kind == "principled" else "Rotation")
-    if turn != 0 or not inputs.reaches("Tangent"):
-        raise Refused(say("it is anisotropic without a Tangent that is linked, or turned"))
+#: Sockets of the anisotropy and of its rotation, by kind of node.
+ANISOTROPY = {
+    "glossy": ("Anisotropy", "Rotation"),
+    "principled": ("Anisotropic", "Anisotropic Rotation"),
+}
+#: The square of the ratio of a Principled node's widths, across and along the tangent, is
+#: 1 + RATIO * anisotropy.
+RATIO = -0.9
+
+
+def _stretches(inputs, kind):
+    """Ratio of the lobe's width along the tangent to that across it, or several."""
+    name, rotation = ANISOTROPY[kind]
+    if kind == "principled" and inputs.follows(name):
+        found = _ANISOTROPIES
+    else:
+        found = (inputs.value(name),)
+    if found == (0,):
+        return (1.0,)
+    # A model's own tangent is another one, and nodes that turn a vector take no default normal.
+    turned = inputs.follows(rotation) or inputs.constant(rotation) != 0
+    for socket in ("Tangent", *(["Normal"] if turned else [])):
+        if not inputs.is_same_everywhere(socket):
+            said = say(
+                "{socket} is a group input that is not linked everywhere", socket=Sentence(socket)
+            )
+            raise Refused(said)
     if kind == "principled":
-        return 1 / (1 - 0.9 * min(max(a, 0.0), 1.0))
-    return (1 - a) ** 2 if a > 0 else 1 / (1 + a) ** 2
+        return tuple(1 / (1 + RATIO * min(max(a, 0.0), 1.0)) for a in found)
+    return tuple((1 - a) ** 2 if a > 0 else 1 / (1 + a) ** 2 for a in found)
 
 
 def glows(inputs):

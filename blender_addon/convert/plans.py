@@ -14,19 +14,26 @@ from ..nearest.native_bsdf import Native
 from ..nearest.nearest_model import base_of, nearest, with_width
 from ..packs import device, pack
 from ..trees import shader_trees
+from .filter_glossy import is_filtered
+from .instances import Instances
 from .node_values import (
+    ANISOTROPY,
     KINDS,
     KNOWN_SOCKETS,
     STAYING,
     Inputs,
     Refused,
+    check_off,
     color_of,
+    effective_sockets,
     given_of,
     glows,
     is_transparent,
 )
 from .seen_node import SeenNode
 
+#: A row of a plan names this many other materials at most.
+_MOST_NAMES = 6
 #: A plan with a larger error is refused, unless another limit is given.
 LIMIT = 0.35
 
@@ -39,7 +46,9 @@ class Part:
     values: dict = field(default_factory=dict)
     #: Parameters by socket of the node.
     links: dict = field(default_factory=dict)
-    #: Parameters that follow a linked roughness: (name, factor, power, low, high).
+    #: Parameters that follow a linked roughness or anisotropy: (name, factor, power, low, high,
+    #: stretched) for factor * roughness^power * (1 - 0.9 anisotropy)^stretched, clamped. A power of
+    #: 0 stands for what is not linked.
     widths: tuple = ()
     #: The matte base beneath the model, and the light that it gets: coefficients of layer.rest().
     base: "Part | None" = None
@@ -73,7 +82,15 @@ class Plan(Part):
     #: Alpha.
     glows: bool = False
     transparent: bool = False
+    #: Whether the models need the node's tangent: that of its link or Cycles' default one, turned.
+    anisotropic: bool = False
+    #: Whether Filter Glossy blurs the node so that it shows, but not its model.
+    filtered: bool = False
     refusal: str = ""
+    #: If the node is in a node group: the other materials that contain it, and the group's inputs
+    #: that had an effect on the node and have none on its replacement.
+    others: tuple = ()
+    unused: tuple = ()
     #: The state of the node when the plan was made.
     seen: SeenNode | None = None
 
@@ -103,25 +120,61 @@ class Plan(Part):
         low, high = map(in_percent, (self.least_error, self.error))
         return high if low == high else say("{low} to {high}", low=low, high=high)
 
+    @property
+    def kept(self):
+        """The sockets of the node whose links stay."""
+        parts = [part for part in self.parts if part.model]
+        found = {socket for part in parts for socket in part.links.values()}
+        found |= {"Normal", "Tangent"} & set(self.node.inputs.keys())
+        if any(part.widths or part.again for part in parts) or self.rest and len(self.rest[0]) > 1:
+            found.add("Roughness")
+        if self.anisotropic:
+            found |= set(ANISOTROPY[KINDS[self.node.bl_idname]])
+        found |= {part.again[3] for part in parts if part.again}
+        found |= {"Metallic"} if self.metal else set()
+        found |= {"Alpha"} if self.transparent else set()
+        return found | ({"Emission Color", "Emission Strength"} if self.glows else set())
+
+    @property
+    def materials(self):
+        """Every material that changes."""
+        return (self.material, *self.others)
+
     def line(self):
         """What the node becomes, in words."""
         of = {"material": self.material.name, "node": Sentence(self.node.bl_label)}
-        if self.node.bl_idname == "ShaderNodeGroup":
+        if getattr(self.node, "node_tree", None) is not None:
             of["node"] = self.node.node_tree.name
+        tree = self.node.id_data
+        if not tree.is_embedded_data:
+            of["node"] = say("{node} in {group}", node=of["node"], group=tree.name)
         if self.refusal:
             return say("{material}, {node}: stays, {why}", **of, why=self.refusal)
         of["model"] = self._label()
         if self.error < 1e-6:
-            return say("{material}, {node}: {model}, the same", **of)
-        return say(
-            "{material}, {node}: {model}, {percent} % of the light in other directions",
-            **of,
-            percent=self._percent(),
-        )
+            said = say("{material}, {node}: {model}, the same", **of)
+        else:
+            said = say(
+                "{material}, {node}: {model}, {percent} % of the light in other directions",
+                **of,
+                percent=self._percent(),
+            )
+        if self.others:
+            names = [material.name for material in self.others]
+            if len(names) > _MOST_NAMES:
+                rest = len(names) - _MOST_NAMES
+                listed = ", ".join(names[:_MOST_NAMES])
+                listed = say("{names} and {count} more", names=listed, count=rest)
+            else:
+                listed = ", ".join(names)
+            said = say("{row}. It changes {materials} too", row=said, materials=listed)
+        if self.unused:
+            names = ", ".join(self.unused)
+            said = say("{row}. Inputs of the group without effect: {names}", row=said, names=names)
+        return said
 
 
-def _plan_glass(material, node):
-    inputs = Inputs(node)
+def _plan_glass(material, node, inputs):
     inputs.setting("mute")
     inputs.check_unknown(KNOWN_SOCKETS["glass"])
     color, roughness = inputs.value("Color"), inputs.value("Roughness")
@@ -131,11 +184,42 @@ def _plan_glass(material, node):
         raise Refused(say("it has {what}", what=Sentence("Thin Film")))
     # Blender's glass tints both reflected and transmitted light.
     error = sum(abs(1 - c) for c in color) / max(sum(color), 1e-6)
+    return _glass_of(material, node, inputs, error)
+
+
+def _is_clear(inputs):
+    """Whether a Principled node transmits all light that enters it, as glass does."""
+    name = "Transmission Weight"
+    return name in inputs and inputs.constant(name) == 1 and inputs.constant("Metallic") == 0
+
+
+def _plan_clear(material, node, inputs):
+    """The Plan for a Principled node that is smooth glass."""
+    inputs.setting("mute")
+    inputs.check_unknown(KNOWN_SOCKETS["principled"])
+    check_off(inputs, but={"Transmission Weight"})
+    if inputs.value("Roughness") > 1e-3:
+        raise Refused(say("no model is of rough glass"))
+    if inputs.value("Specular IOR Level") != 0.5:
+        raise Refused(say("it has {what}", what=Sentence("Specular IOR Level")))
+    if inputs.value("Specular Tint", (1.0, 1.0, 1.0)) != (1, 1, 1):
+        raise Refused(say("it has {what}", what=Sentence("Specular Tint")))
+    # Such a node tints the transmitted light alone.
+    tint = [min(max(c, 0.0), 1.0) ** 0.5 for c in inputs.value("Base Color")]
+    ior = inputs.mean("IOR") or 1.5
+    mirrored = native_bsdf.mean_dielectric(((ior - 1) / (ior + 1)) ** 2)
+    light = 3 * mirrored + (1 - mirrored) * sum(tint)
+    error = (1 - mirrored) * (3 - sum(tint)) / max(light, 1e-6)
+    more = {"glows": glows(inputs), "transparent": is_transparent(inputs)}
+    return _glass_of(material, node, inputs, error, **more)
+
+
+def _glass_of(material, node, inputs, error, **more):
     values = {} if inputs.follows("IOR") else {"ior": inputs.constant("IOR")}
     links = {"ior": "IOR"}
     part = Part("fresnel_dielectric", values, links)
     found = {"material": material, "node": node, "error": error, "least_error": error}
-    return Plan(**vars(part), **found)
+    return Plan(**vars(part), **found, **more)
 
 
 @functools.cache
@@ -155,16 +239,29 @@ def _shown(without_osl):
     return has
 
 
+def _widths(inputs, native, width, factor):
+    """Part.widths of a fit; `native`: the first Native of the fit."""
+    rough = inputs.reaches("Roughness")
+    stretched = native.kind == "principled" and inputs.follows(ANISOTROPY["principled"][0])
+    if not rough and not stretched:
+        return
+    if not rough:
+        factor *= max(native.roughness, 1e-3) ** width.power
+    for name, sign in ((width.name, 1), (width.across, -1)):
+        if name:
+            power = sign * width.stretched if width.across else 0
+            own = factor if stretched else factor * native.stretch**power
+            law = (width.power if rough else 0, width.low, width.high)
+            yield name, own, *law, -power if stretched else 0
+
+
 def _part(inputs, native, fit):
     """The Part for a Fit to a node; `native`: the first Native of the fit."""
     color = color_of(native.kind)
     candidate, factor, width = fit.candidate, fit.factor, fit.candidate.width
     links = {name: color if s == "Color" else s for name, s in candidate.links.items()}
-    values, widths = with_width(candidate, native, factor), ()
-    if width and inputs.reaches("Roughness"):
-        stretch = native.stretch**width.stretched if width.across else 1.0
-        named = [(width.name, stretch), (width.across, 1 / stretch)]
-        widths = tuple((n, factor * s, width.power, width.low, width.high) for n, s in named if n)
+    values = with_width(candidate, native, factor)
+    widths = tuple(_widths(inputs, native, width, factor)) if width else ()
     base, below = None, base_of(candidate, native, inputs.reaches("Roughness"))
     if below:
         linked = {name: color for name in candidate.base.candidate.links}
@@ -180,17 +277,18 @@ def _part(inputs, native, fit):
     return Part(candidate.model, values, links, widths, base, rest, again)
 
 
-def _plan_node(material, node):
+def _plan_node(material, node, inputs):
     if KINDS[node.bl_idname] == "glass":
-        return _plan_glass(material, node)
-    inputs = Inputs(node)
-    given, roughnesses = given_of(node, inputs)
+        return _plan_glass(material, node, inputs)
+    if KINDS[node.bl_idname] == "principled" and _is_clear(inputs):
+        return _plan_clear(material, node, inputs)
+    given, looks = given_of(node, inputs)
     color = color_of(given["kind"])
     _, colors = inputs.colors(color)
 
     def near(**other):
         """The Part for the node with these values changed, and its Fit."""
-        looked = tuple(Native(**given | other, roughness=r) for r in roughnesses)
+        looked = tuple(Native(**given | other, **look) for look in looks)
         has = _shown(device.lacks_osl(lamps.current_scene()))
         fit = nearest(looked, colors, inputs.reaches(color), has)
         if fit is None:
@@ -207,6 +305,8 @@ def _plan_node(material, node):
             )
         more |= {"material": material, "node": node}
         more |= {"error": max(errors), "least_error": min(errors)}
+        more |= {"anisotropic": any(look["stretch"] != 1 for look in looks)}
+        more |= {"filtered": any(is_filtered(Native(**given, **look)) for look in looks)}
         return Plan(**vars(part), **more)
 
     if given["kind"] != "principled":
@@ -238,36 +338,71 @@ def _mixed(share, plain, metal):
 
 
 def plan(materials):
-    """A Plan for each visible Diffuse, Glossy, Principled or Glass node of these materials. Refused
-    are other reflecting nodes, and groups that contain one of the four, as other materials may
-    share the groups."""
-    plans = []
+    """A Plan for each visible Diffuse, Glossy, Principled or Glass node of these materials, also of
+    those in node groups, once each. Refused are other reflecting nodes, and group nodes with one of
+    the four inside if their groups are linked from another file."""
+    plans, instances = {}, Instances()
     for material in materials:
         for node in _convertible(material):
+            place = node.as_pointer()
+            if place in plans and not plans[place].refusal:
+                continue
             try:
-                if why := editable.refusal(material):
+                if why := editable.refusal(material, node.id_data):
                     raise Refused(why)
                 if shader_trees.shading(material) is None:
                     raise Refused(shader_trees.NODES_OFF)
-                if node.bl_idname == "ShaderNodeGroup":
-                    raise Refused(say("its shader is inside this node group: ungroup it first"))
+                if getattr(node, "node_tree", None) is not None:
+                    raise Refused(editable.refusal(node.node_tree))
                 if node.bl_idname not in KINDS:
                     raise Refused(say("this extension has no model that is near"))
-                made = _plan_node(material, node)
+                withins = [instance.within for instance in instances.of(node)]
+                made = _plan_node(material, node, Inputs(node, withins))
             except Refused as why:
                 made = Plan(material=material, node=node, refusal=why.args[0])
-            plans.append(replace(made, seen=SeenNode(material, node)))
-    return plans
+            else:
+                made = _of_group(made)
+            plans[place] = replace(made, seen=SeenNode(material, node, instances))
+    return list(plans.values())
+
+
+def _of_group(made):
+    """The Plan with what its row says of the group that the node is in."""
+    tree = made.node.id_data
+    if tree.is_embedded_data:
+        return made
+    others = tuple(m for m in nodes.users_of(tree) if m != made.material)
+    effective = effective_sockets(made.node)
+    kept = {name for socket in made.kept for name in _group_inputs(made.node.inputs[socket])}
+    lost = [name for socket in effective for name in _group_inputs(socket) if name not in kept]
+    return replace(made, others=others, unused=tuple(dict.fromkeys(lost)))
+
+
+def _group_inputs(socket):
+    """The names of the inputs of its node group on which a socket depends."""
+    found, seen, waiting = [], set(), [shader_trees.reach(socket)]
+    while waiting:
+        reached = waiting.pop()
+        if reached.output is None or reached in seen:
+            continue
+        seen.add(reached)
+        if reached.node.bl_idname == "NodeGroupInput":
+            found.append(reached.output.name)
+        else:
+            waiting += [shader_trees.reach(s, reached.within) for s in reached.node.inputs]
+    return found
 
 
 def _convertible(material):
-    """The nodes of a material for which there is a Plan, in the order of its tree."""
+    """The nodes of a material for which there is a Plan, in the order of its trees. In place of
+    nodes in a group that is linked from another file, the group node."""
     if material.node_tree is None:
         return []
     found = set()
     for shown in shader_trees.shown_by(material.node_tree):
-        if shown.within:
-            found |= {shown.within[0]} if shown.node.bl_idname in KINDS else set()
+        locked = (group for group in shown.within if not editable.keeps_changes(group.node_tree))
+        if (group := next(locked, None)) is not None:
+            found |= {group} if shown.node.bl_idname in KINDS else set()
         elif shown.node.bl_idname not in STAYING and not nodes.is_ours(shown.node):
             found.add(shown.node)
-    return [node for node in material.node_tree.nodes if node in found]
+    return [node for node in nodes.all_nodes(material) if node in found]

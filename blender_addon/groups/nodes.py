@@ -454,17 +454,54 @@ def trees_within(node):
     return trees
 
 
+def all_trees(owner):
+    """The node tree of a material or world, and those of the groups in it, nested groups included;
+    none of this extension."""
+    trees = []
+    _trees(owner.node_tree, trees)
+    return trees
+
+
+def users_of(tree):
+    """The materials that contain a node tree, as their own or in a group."""
+    if tree.is_embedded_data:
+        return [editable.named(tree)]
+    return [material for material in bpy.data.materials if tree in all_trees(material)]
+
+
 def all_nodes(owner):
     """Every node of a material or world, including those in nested groups, but not what groups of
     this extension contain."""
-    trees = []
-    _trees(owner.node_tree, trees)
-    return [node for tree in trees for node in tree.nodes]
+    return [node for tree in all_trees(owner) for node in tree.nodes]
 
 
 def group_nodes(material):
     """Every group node of this extension in a material, including those in nested groups."""
     return [node for node in all_nodes(material) if is_ours(node)]
+
+
+def key(node):
+    """The name by which operators and api address a model node of a material: NODE, or GROUP/NODE
+    for a node in a node group, as names are unique in a tree only."""
+    tree = node.id_data
+    return node.name if tree.is_embedded_data else f"{tree.name}/{node.name}"
+
+
+def named(material, name):
+    """The model node of a material that has this key(), or is the only one of this name. Raises
+    ValueError."""
+    ours = group_nodes(material)
+    found = [node for node in ours if key(node) == name]
+    found = found or [node for node in ours if node.name == name]
+    if len(found) == 1:
+        return found[0]
+    of = {"material": material.name, "node": name}
+    if not ours:
+        raise ValueError(say("Material {material!r} has no model node {node!r}", **of))
+    names = ", ".join(map(key, ours))
+    raise ValueError(
+        say("Material {material!r} has no model node {node!r}, only {names}", **of, names=names)
+    )
 
 
 def shown_nodes(material):

@@ -17,6 +17,10 @@ _MU = (_MU + 1) / 2
 _SHARE = _SHARE * _MU
 
 
+#: A node with a smaller roughness is an ideal mirror.
+SMOOTH = 1e-3
+
+
 @dataclass(frozen=True)
 class Native:
     """A node with its values. `kind`: diffuse, glossy or principled. Colours are (r, g, b) and may
@@ -45,7 +49,7 @@ class Native:
 
     @property
     def is_mirror(self):
-        return self.kind != "diffuse" and self.roughness < 1e-3
+        return self.kind != "diffuse" and self.roughness < SMOOTH
 
 
 def dielectric(f0, cosine):

@@ -396,7 +396,8 @@ class Fit:
 
 @functools.lru_cache(maxsize=256)
 def nearest(natives, colors, colored, has):
-    """The Fit to a tuple of nodes that differ only in roughness; None if no model comes near.
+    """The Fit to a tuple of nodes that differ only in roughness and stretch; None if no model comes
+    near.
 
     Considers the models and values for which has(model, values) is true. The Fit includes the
     errors for nodes of other colours, `colors`. `colored`: whether the node's colour is linked; a
@@ -405,7 +406,9 @@ def nearest(natives, colors, colored, has):
     # The width hardly depends on the base, so it is fitted once for all of them.
     roughly, closely = {}, {}
     for candidate in candidates(native, has):
-        if native.stretch != 1 and not (candidate.width and candidate.width.across):
+        if any(n.stretch != 1 for n in natives) and not (
+            candidate.width and candidate.width.across
+        ):
             continue
         lost = colored and not candidate.is_colored
         key = candidate.model, candidate.width
@@ -443,9 +446,9 @@ def _light_and_error(candidate, targets, factor, color):
 
 
 def _mean(measure, candidate, targets, factor):
-    """The mean of one of Target's methods over nodes that differ in roughness; with several of them
-    the roughness is linked."""
-    follows = len(targets) > 1
+    """The mean of one of Target's methods over nodes; with several roughnesses the roughness is
+    linked."""
+    follows = len({t.native.roughness for t in targets}) > 1
     found = [
         measure(
             t,

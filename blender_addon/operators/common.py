@@ -3,7 +3,6 @@
 
 from ..common import editable
 from ..common.i18n import Sentence, iface, of_error, rpt, say, tip
-from ..groups import nodes
 from ..warnings import checks
 
 ERRORS = (ValueError, RuntimeError)  # CompileError and PackError are RuntimeErrors
@@ -42,16 +41,6 @@ def keeps_changes(operator, *blocks):
     if why := editable.refusal(*blocks):
         operator.poll_message_set(tip(why))
     return why is None
-
-
-def model_node(material, name):
-    """The model node of that name. Raises ValueError."""
-    for node in nodes.group_nodes(material):
-        if node.name == name:
-            return node
-    raise ValueError(
-        say("Material {material!r} has no model node {node!r}", material=material.name, node=name)
-    )
 
 
 class ModalJob:

@@ -14,7 +14,7 @@ from ..groups import nodes
 from ..packs import kernel, optical
 from ..panels.labels import wrapped
 from ..panels.methods import METHODS
-from .common import ERRORS, ChangesActiveMaterial, OfActiveMaterial, model_node, refused
+from .common import ERRORS, ChangesActiveMaterial, OfActiveMaterial, refused
 
 
 class BRDFC_OT_switch(ChangesActiveMaterial, Operator):
@@ -43,19 +43,22 @@ class BRDFC_OT_switch(ChangesActiveMaterial, Operator):
         material = context.object.active_material
         materials = bpy.data.materials if self.all_users else [material]
         try:
-            node = model_node(material, self.node)
+            node = nodes.named(material, self.node)
             identity = nodes.identity(node)
             editable.check(node.id_data)
-            for user in filter(editable.keeps_changes, materials):
-                # All nodes are found before any is changed.
-                alike = [
-                    other
-                    for other in nodes.group_nodes(user)
-                    if editable.keeps_changes(other.id_data) and nodes.identity(other) == identity
-                ]
-                for other in alike if self.all_users else [node]:
-                    nodes.switch(other, self.representation)
-                api.prepare_material(user)
+            # All nodes are found before any is changed. Groups are shared by materials.
+            alike = [
+                other
+                for user in filter(editable.keeps_changes, materials)
+                for other in nodes.group_nodes(user)
+                if editable.keeps_changes(other.id_data) and nodes.identity(other) == identity
+            ]
+            changed = dict.fromkeys(alike) if self.all_users else [node]
+            for other in changed:
+                nodes.switch(other, self.representation)
+            for tree in dict.fromkeys(other.id_data for other in changed):
+                for user in nodes.users_of(tree):
+                    api.prepare_material(user)
         except ERRORS as error:
             return refused(self, error)
         return {"FINISHED"}
@@ -89,7 +92,7 @@ class BRDFC_OT_details(OfActiveMaterial, Operator):
         from ..panels import ui
 
         try:
-            node = model_node(context.object.active_material, self.node)
+            node = nodes.named(context.object.active_material, self.node)
             made = nodes.manifest_entry(node)
         except ERRORS as error:
             said, more = of_error(error)
@@ -149,7 +152,7 @@ class BRDFC_OT_add_albedo(ChangesActiveMaterial, Operator):
     def execute(self, context):
         material = context.object.active_material
         try:
-            nodes.add_albedo(model_node(material, self.node))
+            nodes.add_albedo(nodes.named(material, self.node))
         except ERRORS as error:
             return refused(self, error)
         return {"FINISHED"}
@@ -178,7 +181,7 @@ class BRDFC_OT_kernel(ChangesActiveMaterial, Operator):
 
     def _group(self, material):
         ours = [n for n in nodes.group_nodes(material) if nodes.identity(n)[0] == kernel.MODEL]
-        wanted = [n for n in ours if n.name == self.node] if self.node else ours
+        wanted = [n for n in ours if nodes.key(n) == self.node] if self.node else ours
         active = [n for n in wanted if n == n.id_data.nodes.active]
         if not wanted or (len(wanted) > 1 and not active):
             raise ValueError(
@@ -265,7 +268,7 @@ class BRDFC_OT_substance(ChangesActiveMaterial, Operator):
         try:
             if self.substance == _FILE and not name.endswith(".csv"):
                 raise ValueError(say("{file}: expected a file NAME.csv", file=repr(name)))
-            node = model_node(material, self.node) if self.node else None
+            node = nodes.named(material, self.node) if self.node else None
             stated = self.properties.is_property_set("thickness")
             values = api.set_substance(material, name, node, self.thickness if stated else None)
         except ERRORS as error:

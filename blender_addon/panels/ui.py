@@ -171,7 +171,7 @@ def energy_text(node):
 def _add_method(row, node, name, pressed):
     """The button of a render method."""
     item = row.operator("brdfc.switch", text=form_name(name).template, depress=pressed)
-    item.node, item.representation = node.name, name
+    item.node, item.representation = nodes.key(node), name
 
 
 def _draw_form(layout, node, form, scene, changes):
@@ -209,7 +209,7 @@ def _draw_form(layout, node, form, scene, changes):
         translate=False,
         icon="QUESTION",
         emboss=False,
-    ).node = node.name
+    ).node = nodes.key(node)
     wrapped(column, say("Cost: {cost}", cost=cost_text(node, form)))
     if entry.get("albedo"):
         wrapped(column, say("Albedo: {albedo}", albedo=energy_text(node)))
@@ -241,12 +241,12 @@ def draw_node(layout, node, scene):
     layout.enabled = changes
     if made and optical.can_have(model_name):
         menu = layout.operator_menu_enum("brdfc.substance", "substance", icon="MATERIAL_DATA")
-        menu.node = node.name
+        menu.node = nodes.key(node)
     may_have = made and not nodes.is_baked(node) and group_content.has_albedo(model_name)
     if may_have and nodes.ALBEDO not in node.outputs:
-        layout.operator("brdfc.add_albedo", icon="ADD").node = node.name
+        layout.operator("brdfc.add_albedo", icon="ADD").node = nodes.key(node)
     if model_name == kernel.MODEL:
-        layout.operator("brdfc.kernel", icon="FCURVE").node = node.name
+        layout.operator("brdfc.kernel", icon="FCURVE").node = nodes.key(node)
 
 
 def draw_lamps(layout, material, scene):

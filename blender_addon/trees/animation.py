@@ -42,10 +42,10 @@ def _curves(owner):
     return {curve.as_pointer(): curve for curve in curves}.values()
 
 
-def _targets(node):
-    """Yields (curve, its data-block, the object it animates, the property's name), for every
-    node."""
-    for owner in _owners(node.id_data):
+def _targets(tree):
+    """Yields (curve, its data-block, the object it animates, the property's name), for everything
+    in a tree."""
+    for owner in _owners(tree):
         for curve in _curves(owner):
             # A path may address nodes and sockets by name or by index.
             place, _, name = curve.data_path.rpartition(".")
@@ -66,13 +66,13 @@ def animated_properties(node):
     """The animated or driven properties of a node: {(pointer of the node or socket, property
     name)}."""
     own = {item.as_pointer() for item in (node, *node.inputs, *node.outputs)}
-    found = {(item.as_pointer(), name) for c, _, item, name in _targets(node) if not c.mute}
+    found = {(item.as_pointer(), name) for c, _, item, name in _targets(node.id_data) if not c.mute}
     return {(pointer, name) for pointer, name in found if pointer in own}
 
 
 def _of_inputs(node):
     inputs = {socket.as_pointer(): socket for socket in node.inputs}
-    for curve, owner, found, name in _targets(node):
+    for curve, owner, found, name in _targets(node.id_data):
         if name == _VALUE and found.as_pointer() in inputs:
             yield curve, owner, inputs[found.as_pointer()].identifier
 
@@ -89,17 +89,64 @@ def capture(node):
 
     Returns [(curve, its data-block, socket identifier)]. Blender 5.2 rewrites the paths by itself,
     and gets them wrong."""
-    for owner in _owners(node.id_data) if animated_inputs(node) else ():
-        data = owner.animation_data
-        for holder in _holders(data) if data else ():
-            _make_own(owner, holder)
+    if animated_inputs(node):
+        _make_all_own(node.id_data)
     return list(_of_inputs(node))
+
+
+def move(pairs):
+    """Moves what animates the values of sockets, curves and drivers, also muted ones, to other
+    sockets of the same tree, whose drivers then read the values there. `pairs`: [(from, to)]."""
+    if not pairs:
+        return
+    tree, wanted = pairs[0][0].id_data, {a.as_pointer(): b for a, b in pairs}
+
+    def found():
+        return [
+            (curve, owner, wanted[item.as_pointer()])
+            for curve, owner, item, name in _targets(tree)
+            if name == _VALUE and item.as_pointer() in wanted
+        ]
+
+    if found():
+        _make_all_own(tree)
+    for target in found():
+        retarget(*target)
+    _redirect_readers(tree, wanted)
+
+
+def _redirect_readers(tree, moved):
+    """Drivers of a tree that read the value of a socket read it where it has been moved to."""
+    owners = _owners(tree)
+    drivers = [c.driver for o in owners if o.animation_data for c in o.animation_data.drivers]
+    for target in (t for driver in drivers for v in driver.variables for t in v.targets):
+        place, _, name = target.data_path.rpartition(".")
+        name, bracket, index = name.partition("[")
+        if target.id not in owners or name != _VALUE:
+            continue
+        try:
+            found = target.id.path_resolve(place)
+        except ValueError:  # the node or socket no longer exists
+            continue
+        if (socket := moved.get(found.as_pointer())) is not None:
+            target.data_path = _path(target.id, socket) + bracket + index
+
+
+def _path(owner, socket):
+    """The path from a data-block, a tree or its material, to the value of a socket."""
+    return ("" if owner == socket.id_data else "node_tree.") + socket.path_from_id(_VALUE)
 
 
 def retarget(curve, owner, socket):
     """Redirects a curve or driver to a socket of a tree."""
-    prefix = "" if owner == socket.id_data else "node_tree."
-    curve.data_path = prefix + socket.path_from_id(_VALUE)
+    curve.data_path = _path(owner, socket)
+
+
+def _make_all_own(tree):
+    for owner in _owners(tree):
+        data = owner.animation_data
+        for holder in _holders(data) if data else ():
+            _make_own(owner, holder)
 
 
 def _make_own(owner, holder):

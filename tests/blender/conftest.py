@@ -164,3 +164,9 @@ def use_pack(extension, lean_pack):
 
     yield use
     extension.pack.use()
+
+
+@pytest.fixture
+def convert(extension, empty):
+    extension.scene_loader.apply_clean_settings(empty)
+    return import_module(f"{extension.package}.convert")

@@ -217,6 +217,11 @@ def test_made_local_it_can_be_changed(extension, foreign, tmp_path):
     changed_and_kept(extension, tmp_path)
 
 
+def test_a_material_without_nodes_is_local_already(extension, empty):
+    material = bpy.data.materials.new("Plain")  # before 5.0 it has no node tree
+    assert extension.api.make_local(material) == material
+
+
 @pytest.mark.parametrize("get", [linked, overridden])
 def test_made_local_with_its_object(extension, library, tmp_path, get):
     make_active(get(library, "objects", "Sphere"))

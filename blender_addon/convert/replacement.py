@@ -1,0 +1,295 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Puts models, and the nodes that connect them, in the place of one of Blender's nodes."""
+
+import math
+from dataclasses import dataclass
+
+import bpy
+
+from ..groups import bump_correction, nodes
+from ..packs import pack
+from ..trees import animation, shader_trees, shader_values
+from .node_values import ANISOTROPY, KINDS, RATIO, has_own_animation
+
+#: Custom property of a group node: the name of the node that it replaces.
+BEFORE = "brdfc_before"
+#: Whether Bump Map Correction was on at that time. Missing if an earlier version converted the
+#: node: that version turned it off. Missing as well in node groups, which several materials share.
+CORRECTED = "brdfc_before_bump_map_correction"
+#: Custom property of the nodes that were added along with it: the name of the group node.
+HELPS = "brdfc_helps"
+#: Custom property of a node to which animation was moved: {name: identifier of the socket of the
+#: replaced node from which it comes}. The name is that of a model's parameter, or of a node's
+#: output.
+MOVED = "brdfc_moved"
+
+
+@dataclass(frozen=True)
+class PreparedPart:
+    """A Part with the group of its model, and its values as sockets take them."""
+
+    part: object
+    values: dict
+
+    @property
+    def known(self):
+        """The values, with None for linked parameters."""
+        return self.values | dict.fromkeys(self.part.links)
+
+
+class Replacement:
+    """Replaces the node of a Plan."""
+
+    def __init__(self, plan, parts):
+        self._plan, self._node, self._tree = plan, plan.node, plan.node.id_data
+        self._animated = animation.animated_properties(plan.node)
+        #: The nodes whose output has the animation of a socket of the replaced node, by its name.
+        self._moving = {}
+        #: The tangent of an anisotropic node, once it is made.
+        self._turned = None
+        groups = [self._add(prepared) for prepared in parts]
+        self._group, *others = groups
+        self._group[BEFORE] = self._node.name
+        for i, other in enumerate(others):
+            other[HELPS] = self._group.name
+            other.location.y -= 300 * (i + 1)
+            for helper in self._tree.nodes:
+                if helper.get(HELPS) == other.name:
+                    helper[HELPS] = self._group.name
+        self._put(self._joined(groups))
+        self._move_animation()
+
+    def _put(self, shader):
+        """Links the shader where the node was."""
+        node = self._node
+        for link in [link for link in node.outputs[0].links if shader_trees.counts(link)]:
+            target = link.to_socket
+            self._tree.links.remove(link)
+            self._tree.links.new(shader, target)
+        node.location = (node.location.x, node.location.y - 700)
+
+    def _source(self, name):
+        """The output that controls a socket of the node; None if its own value does, which is not
+        animated."""
+        socket = self._node.inputs[name]
+        if shader_trees.is_driven(socket):
+            return next(link.from_socket for link in socket.links if shader_trees.counts(link))
+        if name not in self._moving and has_own_animation(socket, self._animated):
+            is_color = socket.type == "RGBA"
+            source = self._helper("ShaderNodeRGB" if is_color else "ShaderNodeValue")
+            source.location.x -= 440
+            source.label, source.outputs[0].default_value = name, socket.default_value
+            self._moving[name] = source
+        return self._moving[name].outputs[0] if name in self._moving else None
+
+    def _move_animation(self):
+        """Moves the animation of the node's sockets to a parameter, if it has just that effect, or
+        to the output of the node that was added for it."""
+        pairs = []
+        for name, source in self._moving.items():
+            socket, output = self._node.inputs[name], source.outputs[0]
+            target = output.links[0].to_socket if len(output.links) == 1 else None
+            if target is not None and nodes.is_ours(target.node) and target.type == socket.type:
+                names = {s: parameter for parameter, s in nodes.sockets(target.node).items()}
+                self._mark(target.node, names[target], socket)
+                target.default_value = socket.default_value
+                self._tree.nodes.remove(source)
+            else:
+                target = output
+                self._mark(source, output.name, socket)
+            pairs.append((socket, target))
+        animation.move(pairs)
+
+    @staticmethod
+    def _mark(node, name, socket):
+        marks = node[MOVED].to_dict() if MOVED in node else {}
+        node[MOVED] = marks | {name: socket.identifier}
+
+    def _add(self, prepared):
+        """The group node of a model, with the links of the node that it replaces."""
+        tree, node = self._tree, self._node
+        group = nodes.add_group_node(tree, prepared.part.model, values=prepared.known)
+        group.location = node.location
+        if tree.is_embedded_data:
+            group[CORRECTED] = bump_correction.recorded(self._plan.material)
+        self._group = group
+        for name, value in prepared.values.items():
+            nodes.set_value(group, name, value)
+        present = nodes.sockets(group)
+        for name, socket in prepared.part.links.items():
+            if source := self._source(socket):
+                tree.links.new(source, present[name])
+        for name, source in (
+            (pack.NORMAL, self._vector("Normal")),
+            (pack.TANGENT, self._tangent()),
+        ):
+            if source is not None and name in present:
+                tree.links.new(source, present[name])
+        if prepared.part.again:
+            tree.links.new(self._again(prepared.part.again), present["again"])
+        for name, *law in prepared.part.widths:
+            tree.links.new(self._follow(*law), present[name])
+        return group
+
+    def _joined(self, groups):
+        """The shader that replaces the node: its models, and the node's effects that they lack."""
+        plan, links = self._plan, self._tree.links
+        shader, *others = (group.outputs["BSDF"] for group in groups)
+        if plan.base:
+            left = self._helper("ShaderNodeMixShader")
+            links.new(self._rest(), left.inputs[0])
+            links.new(others[0], left.inputs[2])
+            shader = self._sum(shader, left.outputs[0])
+        if plan.metal:
+            shader = self._mix("Metallic", shader, others[-1])
+        if plan.glows:
+            emission = self._helper("ShaderNodeEmission")
+            for name, socket in (("Color", "Emission Color"), ("Strength", "Emission Strength")):
+                self._give(emission.inputs[name], socket)
+            shader = self._sum(shader, emission.outputs[0])
+        if plan.transparent:
+            clear = self._helper("ShaderNodeBsdfTransparent")
+            shader = self._mix("Alpha", clear.outputs[0], shader)
+        return shader
+
+    def _helper(self, kind):
+        """A node that is added along with a group to replace the node."""
+        tree, group = self._tree, self._group
+        count = sum(n.get(HELPS) == group.name for n in tree.nodes)
+        helper = tree.nodes.new(kind)
+        helper.location = (group.location.x + 220, group.location.y + 60 - 60 * count)
+        helper.hide, helper[HELPS] = True, group.name
+        return helper
+
+    def _sum(self, first, second):
+        add = self._helper("ShaderNodeAddShader")
+        self._tree.links.new(first, add.inputs[0])
+        self._tree.links.new(second, add.inputs[1])
+        return add.outputs[0]
+
+    def _rest(self):
+        """Nodes for the light that a layer leaves to its base, the polynomial of layer.rest()."""
+        # With this Blend, Facing is 1 minus the cosine.
+        view = self._helper("ShaderNodeLayerWeight")
+        view.inputs["Blend"].default_value = 0.5
+        if source := self._source("Normal"):
+            self._tree.links.new(source, view.inputs["Normal"])
+        rest = self._plan.rest
+        roughness = self._roughness() if len(rest[0]) > 1 else None
+        rows = [self._polynomial(row, roughness) for row in rest]
+        return self._polynomial(rows, view.outputs["Facing"])
+
+    def _roughness(self):
+        """The linked roughness between 0 and 1."""
+        clamped = self._helper("ShaderNodeClamp")
+        self._tree.links.new(self._source("Roughness"), clamped.inputs["Value"])
+        return clamped.outputs[0]
+
+    def _polynomial(self, coefficients, of):
+        """Nodes for Horner's rule. Coefficients are numbers or outputs of nodes."""
+        found = coefficients[-1]
+        for c in reversed(coefficients[:-1]):
+            found = self._operation("ShaderNodeMath", "MULTIPLY_ADD", found, of, c)
+        return found
+
+    def _operation(self, kind, operation, *operands):
+        """A Math or Vector Math node. Operands are numbers, vectors or outputs of nodes."""
+        step = self._helper(kind)
+        step.operation = operation
+        for socket, operand in zip(step.inputs, operands, strict=False):
+            if isinstance(operand, bpy.types.NodeSocket):
+                self._tree.links.new(operand, socket)
+            elif isinstance(operand, float) and kind == "ShaderNodeVectorMath":
+                socket.default_value = (operand,) * 3
+            else:
+                socket.default_value = operand
+        return step.outputs[0]
+
+    def _again(self, law):
+        """Nodes for native_bsdf.interreflection() of a linked colour or roughness."""
+        slope, offset, mean, color = law
+
+        def vector(operation, *operands):
+            return self._operation("ShaderNodeVectorMath", operation, *operands)
+
+        source = self._source(color) or shader_values.constant(self._node.inputs[color])
+        average = vector("MULTIPLY_ADD", source, slope, offset)
+        roughness = self._roughness() if len(mean) > 1 else None
+        mean = self._polynomial(mean, roughness)
+        lost = self._operation("ShaderNodeMath", "SUBTRACT", mean, 1.0)
+        left = vector("MULTIPLY_ADD", average, lost, 1.0)
+        return vector("DIVIDE", vector("MULTIPLY", average, mean), left)
+
+    def _mix(self, name, first, second):
+        mix = self._helper("ShaderNodeMixShader")
+        self._give(mix.inputs[0], name)
+        self._tree.links.new(first, mix.inputs[1])
+        self._tree.links.new(second, mix.inputs[2])
+        return mix.outputs[0]
+
+    def _give(self, socket, name):
+        """Passes what reaches a socket of the replaced node on to another socket."""
+        if source := self._source(name):
+            self._tree.links.new(source, socket)
+            return
+        value = shader_values.constant(self._node.inputs[name])
+        socket.default_value = (*value, 1.0) if isinstance(value, tuple) else value
+
+    def _follow(self, factor, power, low, high, stretched):
+        """Nodes for a row of Part.widths."""
+        found = None
+        if power:
+            found = self._math("MAXIMUM", self._source("Roughness"), 1e-3)
+            found = self._math("POWER", found, power)
+        if stretched:
+            ratio = self._math("MULTIPLY_ADD", self._source(self._sockets[0]), RATIO, 1.0)
+            ratio = self._math("MINIMUM", self._math("MAXIMUM", ratio, 1 + RATIO), 1.0)
+            ratio = self._math("POWER", ratio, stretched)
+            found = self._math("MULTIPLY", found, ratio) if found else ratio
+        found = self._math("MAXIMUM", self._math("MULTIPLY", found, factor), low)
+        return self._math("MINIMUM", found, high)
+
+    def _math(self, operation, *operands):
+        """A Math node before the group."""
+        output = self._operation("ShaderNodeMath", operation, *operands)
+        output.node.location.x -= 440
+        return output
+
+    @property
+    def _sockets(self):
+        """The names of the node's sockets of anisotropy and rotation."""
+        return ANISOTROPY[KINDS[self._node.bl_idname]]
+
+    def _vector(self, name):
+        return self._source(name) if name in self._node.inputs else None
+
+    def _tangent(self):
+        """The tangent of the replaced node. Nodes without a link take that of a Tangent node."""
+        linked = self._vector("Tangent")
+        if not self._plan.anisotropic:
+            return linked
+        if self._turned is None:
+            self._turned = self._turn(linked or self._radial())
+        return self._turned
+
+    def _radial(self):
+        tangent = self._helper("ShaderNodeTangent")
+        tangent.direction_type, tangent.axis = "RADIAL", "Z"
+        return tangent.outputs[0]
+
+    def _turn(self, tangent):
+        """The tangent, turned about the normal."""
+        socket = self._node.inputs[self._sockets[1]]
+        linked, angle = self._source(socket.name), shader_values.constant(socket)
+        if not linked and not angle:
+            return tangent
+        rotate = self._helper("ShaderNodeVectorRotate")
+        axis = self._vector("Normal") or self._helper("ShaderNodeNewGeometry").outputs["Normal"]
+        self._tree.links.new(tangent, rotate.inputs["Vector"])
+        self._tree.links.new(axis, rotate.inputs["Axis"])
+        if linked:
+            turned = self._math("MULTIPLY", linked, math.tau)
+            self._tree.links.new(turned, rotate.inputs["Angle"])
+        else:
+            rotate.inputs["Angle"].default_value = math.tau * angle
+        return rotate.outputs[0]
