@@ -115,29 +115,31 @@ def _direction(w, u, v):
 _SEEN = [
     ["towards", "VECTOR"],
     ["drop", "FLOAT"],
+    ["of_cones", "FLOAT"],
     ["solid_angle", "FLOAT"],
     ["chord", "FLOAT"],
+    ["chord_of_others", "FLOAT"],
     ["reach", "FLOAT"],
     ["flat", "FLOAT"],
     ["used", "FLOAT"],
     ["active", "FLOAT"],
     ["above", "FLOAT"],
-    ["sine", "FLOAT"],
+    ["count", "FLOAT"],
     ["clear", "FLOAT"],
 ]
 #: Vectors of a slot, and what its shape's first number consists of.
 _SLOT = ("place", "turn", "scale", "shape")
-_CODED = [["kind", "FLOAT"], ["parts", "FLOAT"], ["plane", "FLOAT"]]
+_CODED = [["kind", "FLOAT"], ["most", "FLOAT"], ["plane", "FLOAT"]]
 _AXES = [
     ["across", "VECTOR"],
     ["along", "VECTOR"],
     ["away", "VECTOR"],
     ["half_across", "FLOAT"],
     ["half_along", "FLOAT"],
-    ["strip", "VECTOR"],
 ]
-#: Directions to the parts of a lamp.
-_PARTS = [[f"part {i}", "VECTOR"] for i in range(slots.MOST_PARTS)]
+#: Axes of the cones of a lamp, and the corners in which they may lie.
+_CONES = [[f"axis {i}", "VECTOR"] for i in range(slots.MOST_CONES)]
+_CORNERS = ((0.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
 #: Larger than the angle between any two directions.
 _FAR = 4.0
 
@@ -149,13 +151,13 @@ def _decoded(w, shape):
     plane = w.math("FLOOR", w.math("DIVIDE", code, slots.CODE))
     return {
         "kind": w.math("MULTIPLY_ADD", code, -slots.CODE, whole),
-        "parts": w.math("MULTIPLY_ADD", plane, -slots.CODE, w.math("ADD", code, 1.0)),
+        "most": w.math("MULTIPLY_ADD", plane, -slots.CODE, w.math("ADD", code, 1.0)),
         "plane": plane,
     }
 
 
 def _seen_group(parts):
-    """The group that computes the cones of directions towards a slot's lamp and its parts."""
+    """The group that computes the cones of directions towards a slot's lamp."""
     vectors = (*_SLOT, "at", "view", "normal")
 
     def fill(w, found):
@@ -164,18 +166,19 @@ def _seen_group(parts):
         known |= here.add("axes", **known)
         known |= here.add("cone", **known)
         clear = 0.0
-        for i, (name, _) in enumerate(_PARTS):
-            part = here.add("part", **known, index=float(i))
-            known[name] = part["part"]
-            clear = w.math("ADD", clear, part["clear"])
+        for i, ((name, _), (x, y)) in enumerate(zip(_CONES, _CORNERS, strict=True)):
+            cone = here.add("cone_at", **known, index=float(i), x=x, y=y)
+            known[name] = cone["axis"]
+            share = known["share" if i == 0 else "share_of_others"]
+            clear = w.math("MULTIPLY_ADD", cone["clear"], share, clear)
         return {name: (known | {"clear": clear})[name] for name, _ in outputs}
 
-    outputs = _SEEN + _CODED + _AXES + _PARTS
+    outputs = _SEEN + _CODED + _AXES + _CONES
     content = [
         "seen",
         slots.CODE,
-        slots.MOST_PARTS,
-        [parts.data[name] for name in ("axes", "cone", "part")],
+        _CORNERS,
+        [parts.data[name] for name in ("axes", "cone", "cone_at")],
     ]
     inputs = [[name, "VECTOR"] for name in vectors]
     return make_group("lamp seen", content, inputs, outputs, fill)
@@ -192,14 +195,14 @@ def _point_of(w, towards, drop, anywhere, u):
 
 
 def _lamp_group(parts):
-    """The group that makes a lamp's closures, a cone for each of its parts, which carry the model's
+    """The group that makes a lamp's closures, one for each of its cones, which carry the model's
     value at one of its points, or the part of it that random directions leave. Cycles skips its
     computations where the factor `lit` is 0."""
     vectors = (*_SLOT, "towards", "at", "view", "tangent", "bitangent", "normal", "anywhere")
-    of_cone = ("chord", "flat", "room", "solid_angle", "clear", "parts")
-    numbers = (*of_cone, "drop", "lit", "u_0", "u_1", "u_2")
+    of_cone = ("chord", "chord_of_others", "flat", "room", "solid_angle", "clear")
+    numbers = (*of_cone, "of_cones", "most", "count", "drop", "lit", "u_0", "u_1", "u_2")
     inputs = [[name, "VECTOR"] for name in vectors] + [[name, "FLOAT"] for name in numbers]
-    inputs += [["kind", "FLOAT"], *_AXES, *_PARTS]
+    inputs += [["kind", "FLOAT"], *_AXES, *_CONES]
     inputs += [[name, kind] for name, kind in parts.inputs("value").items() if name != "wi"]
     known = {name for name, _ in inputs}
     inputs += [[name, "FLOAT"] for name in svm_constants.VALUES if name not in known]
@@ -214,15 +217,18 @@ def _lamp_group(parts):
         cone = {name: found[name] for name in of_cone}
         cone |= {"emphasis": on_flat["emphasis"], "u_2": found["u_2"]}
         lobe = here.add("lobe", **at_point, **cone)
-        cones = []
-        for i, (name, _) in enumerate(_PARTS):
-            toon = w.toon(lobe["color"], lobe["size"], w.half(found[name], found["view"]))
-            exists = w.math("GREATER_THAN", found["parts"], i + 0.5)
-            cones.append(w.shown(exists, toon) if i > 0 else toon)
+        halves = [w.half(found[name], found["view"]) for name, _ in _CONES]
+        cones = [w.toon(lobe["color"], lobe["size"], halves[0])]
+        for i, half in enumerate(halves[1:], 1):
+            toon = w.toon(lobe["color_of_others"], lobe["size_of_others"], half)
+            # The first factor is a constant, with which Cycles removes what a lamp never has.
+            may_exist = w.math("GREATER_THAN", found["most"], i + 0.5)
+            exists = w.math("MULTIPLY", may_exist, w.math("GREATER_THAN", found["count"], i + 0.5))
+            cones.append(w.shown(exists, toon))
         return {"BSDF": w.shown(found["lit"], w.sum(cones))}
 
     used = ("value", "flat", "lobe")
-    content = ["lamp", slots.MOST_PARTS, {name: parts.data[name] for name in used}]
+    content = ["lamp", len(_CONES), {name: parts.data[name] for name in used}]
     return make_group(f"{parts.title}: lamp", content, inputs, [["BSDF", "SHADER"]], fill)
 
 
@@ -332,7 +338,7 @@ def _wired(w, data, normal, tangent, parameters, of_slots, title):
         bent = w.vector("DISTANCE", surface.normal, surface.interpolated, output="Value")
         given |= {"stands": w.math("LESS_THAN", bent, 1e-4), "camera": surface.camera}
         given |= parts.add("base", **given)
-        shaders += [_of_base(w, closure, given, surface.normal) for closure in data["base"]]
+        shaders += [_of_base(w, closure, given, surface) for closure in data["base"]]
     lamps = []
     # All closures of a shading point are sampled with the same numbers: they are added up, so they
     # need not be independent.
@@ -354,12 +360,14 @@ def _wired(w, data, normal, tangent, parameters, of_slots, title):
     return {"BSDF": w.sum(shaders)}
 
 
-def _of_base(w, closure, given, normal):
+def _of_base(w, closure, given, surface):
     """A closure of the base."""
     found = {name: given[of] for name, of in closure.items() if name != "kind"}
     if closure["kind"] == "cone":
-        return w.toon(found["weight"], found["size"], normal, found["smooth"], "DIFFUSE")
-    return w.bsdf(closure["kind"], found["weight"], normal, found.get("roughness", 0.0))
+        return w.toon(found["weight"], found["size"], surface.normal, found["smooth"], "DIFFUSE")
+    stretched = (found["anisotropy"], surface.tangent) if "anisotropy" in found else None
+    roughness = found.get("roughness", 0.0)
+    return w.bsdf(closure["kind"], found["weight"], surface.normal, roughness, stretched)
 
 
 def _rest(w, parts, surface, given, lamps, narrow):

@@ -72,7 +72,8 @@ class Wiring:
         self.give(node.inputs["Value"], x)
         return node.outputs["Value"]
 
-    def bsdf(self, kind, color, normal, roughness=0.0):
+    def bsdf(self, kind, color, normal, roughness=0.0, stretched=None):
+        """`stretched`: the anisotropy of a glossy node and its tangent."""
         if kind == "diffuse":
             node = self.node("ShaderNodeBsdfDiffuse")
         else:
@@ -82,6 +83,9 @@ class Wiring:
         self.give(node.inputs["Color"], color)
         self.give(node.inputs["Roughness"], roughness)
         self.give(node.inputs["Normal"], normal)
+        if stretched:
+            self.give(node.inputs["Anisotropy"], stretched[0])
+            self.give(node.inputs["Tangent"], stretched[1])
         return node.outputs["BSDF"]
 
     def sum(self, shaders):

@@ -59,7 +59,7 @@ def ask(lamps_that_fit, are_codes_read):
 def _most(scene):
     """How many lamps there is room for in the open file's materials on a scene's device."""
     found = _room(scene)
-    return slots.SLOTS * slots.MOST_PARTS if found is None else found[0]
+    return slots.SLOTS * slots.MOST_CONES if found is None else found[0]
 
 
 def limit_of(scene):
@@ -72,11 +72,11 @@ def device_changed(scene):
     return device.runs_on_optix(scene) != memory.on_optix
 
 
-def _parts(chosen, most):
-    """The number of parts of each chosen lamp. All of them have a closure, of which there is room
-    for `most`; parts go to lamps that are bright and long."""
+def _cones(chosen, most):
+    """The number of cones that each chosen lamp may have. All of them have a closure, of which
+    there is room for `most`; bright lamps get more."""
     counts = [1] * len(chosen)
-    wanted = [c.sheet.parts() if c.sheet is not None else 1 for c in chosen]
+    wanted = [c.sheet.cones() if c.sheet is not None else 1 for c in chosen]
 
     def worth(i):
         return chosen[i].rank / counts[i] if counts[i] < wanted[i] else 0.0
@@ -108,11 +108,11 @@ def _planes(chosen):
 
 def _numbers(chosen, most):
     """The numbers of the slots of the chosen lamps."""
-    parts, planes = _parts(chosen, most), _planes(chosen)
-    if (max(parts, default=1) > 1 or any(planes)) and not _are_codes_read():
+    cones, planes = _cones(chosen, most), _planes(chosen)
+    if (max(cones, default=1) > 1 or any(planes)) and not _are_codes_read():
         return [c.values for c in chosen]
-    found = zip(chosen, parts, planes, strict=True)
-    return [slots.coded(c.values, parts, plane) for c, parts, plane in found]
+    found = zip(chosen, cones, planes, strict=True)
+    return [slots.coded(c.values, count, plane) for c, count, plane in found]
 
 
 def _worth_aiming(survey):

@@ -17,12 +17,13 @@ PARTS = ("LampPlace", "LampTurn", "LampScale", "LampShape")
 #: Shapes of lamps, as numbered in the shaders (osl/brdfc.osl.in, brdfc_lamp). What the number in a
 #: slot is above a whole one belongs to the kinds that have that shape (kinds/).
 EMPTY, BALL, SUN, RECTANGLE, ELLIPSE, SKY_SUN = range(6)
-#: The number of the shape of a rectangle or an ellipse is increased by CODE times the number of its
-#: parts less one, and by CODE squared times the number of its plane, if there are others in that
-#: plane. Formula Nodes read both (content/formula_nodes.py), other shaders skip them.
+#: The number of the shape of a rectangle or an ellipse is increased by CODE times the number of
+#: cones that it may have less one, and by CODE squared times the number of its plane, if there are
+#: others in that plane. Formula Nodes read both (content/formula_nodes.py), other shaders skip
+#: them.
 CODE = 8.0
-#: Most parts of a rectangle. Formula Nodes have a closure for each.
-MOST_PARTS = 4
+#: Most cones of a rectangle. Formula Nodes have a closure for each.
+MOST_CONES = 5
 #: Index of that number in a slot.
 _SHAPE = 9
 
@@ -96,12 +97,9 @@ class Sheet:
     is_rectangle: bool
     stays: bool
 
-    def parts(self):
-        """How many parts in a row it should have."""
-        short, long = sorted(self.sizes)
-        if not self.is_rectangle or short <= 0:
-            return 1
-        return max(1, min(MOST_PARTS, round(long / short)))
+    def cones(self):
+        """How many cones it should have (generator/forms/node_lamps.h)."""
+        return MOST_CONES if self.is_rectangle and min(self.sizes) > 0 else 1
 
     def is_beside(self, other):
         """Whether both are in one plane, shine the same way and do not overlap, in the directions
@@ -156,10 +154,10 @@ def numbers(shape, place=(0, 0, 0), turn=(0, 0, 0), scale=(1, 1, 1), sizes=(0, 0
     return (*place, *turn, *scale, shape if isinstance(shape, Driven) else float(shape), *sizes)
 
 
-def coded(values, parts, plane):
-    """The numbers of a flat lamp with this number of parts, in a plane with this number: 0 if it is
-    alone there."""
-    shape, added = values[_SHAPE], CODE * (parts - 1 + CODE * plane)
+def coded(values, cones, plane):
+    """The numbers of a flat lamp that may have this number of cones, in a plane with this number: 0
+    if it is alone there."""
+    shape, added = values[_SHAPE], CODE * (cones - 1 + CODE * plane)
     if isinstance(shape, Driven):
         shape = replace(shape, added=shape.added + added)
     else:

@@ -10,12 +10,14 @@
 // drawn directions find the highlight of a lobe that is narrow for its lamp, and the closure has the light of a lamp
 // that is small for the lobe. The two parts add up to f cos in every direction.
 //
-// A ball or a sun fills its cone. A rectangle or an ellipse does not: its cone is the largest that fits into it, and
-// carries the light of the whole lamp. A long rectangle has several parts in a row, with a cone each; all of them carry
-// the same value, so that the model's formula runs once. Cycles drops closures with a small weight, so the cone of a
-// small lamp is widened until it carries kWidened of the light; that share of the light beside the lamp then counts
-// twice. If two cones overlap, the earlier lamp in the list, which is sorted by size with the widest first, is left to
-// drawn directions. Otherwise light in the overlap would count twice.
+// A ball or a sun fills its cone. A rectangle or an ellipse does not, so its closures carry the light of the whole
+// lamp. An ellipse has the largest cone that fits into it. A rectangle has up to five cones, which cover most of it as
+// seen from the shading point: the largest in the middle and one of half its width in each corner, or, if the
+// rectangle looks more than twice as long as wide, a row. They may overlap, since only their sum counts. All of them
+// carry the same value, so that the model's formula runs once. Cycles drops closures with a small weight, so the cone
+// of a small lamp is widened until it carries kWidened of the light; that share of the light beside the lamp then
+// counts twice. If the cones of two lamps overlap, the earlier lamp in the list, which is sorted by size with the
+// widest first, is left to drawn directions. Otherwise light in the overlap would count twice.
 //
 // The formulas run only as nodes (print/node_program.h), for which a division by 0 and the root of a negative number
 // give 0.
@@ -27,11 +29,11 @@
 namespace brdfc::forms {
 
 /// The contents of a lamp slot: see brdfc_lamp() in osl/brdfc.osl.in and blender_addon/lamps/slots.py. `kind` and
-/// `parts` come from shape.x.
+/// `most` come from shape.x.
 template <class T> struct LampSlot {
   Vec3<T> place, turn, scale, shape;
   T kind;
-  T parts;  ///< number of parts of a rectangle, along its longer side
+  T most;  ///< the number of cones that the lamp may have
 };
 
 /// The orientation and size of a lamp, from its slot. It does not depend on the shading point, so Cycles computes it
@@ -39,7 +41,6 @@ template <class T> struct LampSlot {
 template <class T> struct LampAxes {
   Vec3<T> across, along, away;  ///< unit vectors; `away` points away from the shining side
   T half_across, half_along;    ///< half axes of a rectangle or an ellipse
-  Vec3<T> strip;                ///< half the longer axis of a rectangle with several parts; otherwise 0
 };
 template <class T> LampAxes<T> lamp_axes(const LampSlot<T>& slot) {
   const Vec3<T>& q = slot.turn;
@@ -50,26 +51,72 @@ template <class T> LampAxes<T> lamp_axes(const LampSlot<T>& slot) {
   axes.away = {T(2) * (q.x * q.z + w * q.y), T(2) * (q.y * q.z - w * q.x), T(1) - T(2) * (q.x * q.x + q.y * q.y)};
   axes.half_across = abs(slot.shape.y * slot.scale.x) / T(2);
   axes.half_along = abs(slot.shape.z * slot.scale.y) / T(2);
-  const Vec3<T> longer =
-      select(axes.half_along < axes.half_across, axes.across * axes.half_across, axes.along * axes.half_along);
-  axes.strip = longer * select(T(1.5) < slot.parts, T(1), T(0));
   return axes;
+}
+
+/// The cones of a rectangle, as seen from a shading point. Their middles are those of the lamp moved by `row` times a
+/// number in [-1, 1], and by `across` and `along` times -1 or 1.
+template <class T> struct LampCones {
+  T count;
+  T sine, sine_of_others;  ///< of the radius of the first cone and of each other one
+  T in_row;                ///< number of cones in the row; 1 if the others are in the corners
+  Vec3<T> row;             ///< half the distance between the first and the last of a row
+  Vec3<T> across, along;   ///< half the distance between corners
+};
+/// `centre`: from the shading point to the middle of the lamp. `many`: whether there may be more than one cone.
+///
+/// A cone lies within a rectangle if it lies on the inner side of the four planes through the shading point and an
+/// edge. If A and B are half the lamp's axes and C is its middle, the plane through the edge at C + A has the normal
+/// B x (C + A). So the sine of the angle between C and that plane is |det(A, B, C)| / (|C| |B x (C + A)|). For the
+/// point C + tA of the lamp it is (1 - t) times that, with |C + tA| in place of |C|.
+template <class T, class Bool> LampCones<T> cones_of_rectangle(const LampSlot<T>& slot, const LampAxes<T>& lamp,
+                                                               const Vec3<T>& centre, const Bool& many) {
+  const Vec3<T> a = lamp.across * lamp.half_across, b = lamp.along * lamp.half_along;
+  const T a2 = sqr(lamp.half_across), b2 = sqr(lamp.half_along), c2 = dot(centre, centre);
+  const T ac = abs(dot(a, centre)), bc = abs(dot(b, centre));
+  // |B x (C + A)|^2 and |A x (C + B)|^2, at the end of each axis where they are larger.
+  const T at_a2 = b2 * (c2 + a2 + T(2) * ac) - sqr(bc), at_b2 = a2 * (c2 + b2 + T(2) * bc) - sqr(ac);
+  const auto a_is_longer = at_a2 < at_b2;
+  const T longer2 = maximum(at_a2, at_b2), ratio = sqrt(longer2 / minimum(at_a2, at_b2));
+  const T nearest = lamp.half_across * lamp.half_along * abs(dot(lamp.away, centre)) / sqrt(longer2);
+  LampCones<T> cones;
+  // Found by counting how often each point of a rectangle is covered: of the patterns of five circles, the corners have
+  // the least variance up to a ratio of 2, and beyond it the row with the fewest circles that leave no gaps.
+  const auto corners = many && T(4.5) < slot.most && ratio < T(2);
+  const T longer_than =
+      select(T(2) < ratio, T(1), T(0)) + select(T(3) < ratio, T(1), T(0)) + select(T(4) < ratio, T(1), T(0));
+  cones.in_row = select(many && !corners, minimum(slot.most, T(2) + longer_than), T(1));
+  cones.count = select(corners, T(5), cones.in_row);
+  const T moved = select(T(1.5) < cones.in_row, T(1) - T(1) / ratio, T(0)), halves = select(corners, T(0.5), T(0));
+  cones.row = select(a_is_longer, a, b) * moved;
+  cones.across = a * halves;
+  cones.along = b * halves;
+  // All cones of a row have the size of the farthest one, and so have those in the corners.
+  const T end2 = c2 + moved * (moved * select(a_is_longer, a2, b2) + T(2) * select(a_is_longer, ac, bc));
+  const T corner2 = c2 + T(0.25) * (a2 + b2) + ac + bc;
+  cones.sine = nearest / sqrt(end2);
+  cones.sine_of_others = select(corners, nearest * T(0.5) / sqrt(corner2), cones.sine);
+  return cones;
 }
 
 /// A lamp as seen from a shading point. Radii are given as chords (the distance between the tips of two unit vectors),
 /// which take fewer nodes than angles.
 template <class T> struct LampCone {
-  Vec3<T> towards;  ///< unit vector to the middle of the lamp
-  T drop;           ///< 1 - cos of the radius of the largest cone within the lamp, or within each of its parts
-  T solid_angle;    ///< of all cones; 0 for a lamp that drawn directions can't hit
-  T sine;           ///< of the radius of each cone
-  T chord;          ///< radius of the closure; for a ball or a sun it includes a seam
-  T reach;          ///< radius of a cone around the whole lamp
-  T flat;           ///< 1 for a rectangle or an ellipse, otherwise 0
-  T used;           ///< 0 for an empty slot, otherwise 1
-  T active;         ///< 0 for an empty slot and for a lamp that is left to drawn directions, otherwise 1
-  T above;          ///< 1 if a part of the lamp is above the horizon, otherwise 0
-  T clear;          ///< the number of cones above the horizon, with fractions: see part_of_strip()
+  Vec3<T> towards;     ///< unit vector to the middle of the lamp
+  LampCones<T> cones;  ///< of a rectangle
+  T drop;              ///< 1 - cos of the radius of the lamp, or of its first cone
+  T of_cones;          ///< solid angle of all cones
+  T solid_angle;       ///< the same, or 0 for a lamp that drawn directions can't hit
+  T share;             ///< of the first cone, in the solid angle of all
+  T share_of_others;   ///< of each other one
+  T chord;             ///< radius of the closure; for a ball or a sun it includes a seam
+  T chord_of_others;   ///< the same for the other cones
+  T reach;             ///< radius of a cone around the whole lamp
+  T flat;              ///< 1 for a rectangle or an ellipse, otherwise 0
+  T used;              ///< 0 for an empty slot, otherwise 1
+  T active;            ///< 0 for an empty slot and for a lamp that is left to drawn directions, otherwise 1
+  T above;             ///< 1 if a part of the lamp is above the horizon, otherwise 0
+  T clear;             ///< the part of all cones that is above the horizon: see cone_at()
 };
 
 /// Half the width of the lobe of a drawn direction, which is also its minimum distance from lamps.
@@ -98,56 +145,65 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& slot, const LampAxes<T
   // Squared sines of the radii.
   const T of_ball = sqr(slot.shape.y) / distance2;
   const T of_sun = sqr(sin(minimum(abs(slot.shape.y) / T(2), T(1.5))));
-  // The largest cone about the centre that fits within a disk: its rim touches the disk where the plane recedes. All
-  // parts have the cone of the farthest one, the first or the last.
-  const Vec3<T> end = lamp.strip * (T(1) - T(1) / slot.parts);
-  const T height_of_lamp = dot(lamp.away, centre);
-  const T farthest = T(1) / sqrt(distance2 + dot(end, end) + T(2) * abs(dot(end, centre)));
-  const T facing = height_of_lamp * farthest, slant = sqrt(T(1) - facing * facing);
-  const T narrower = minimum(lamp.half_across, lamp.half_along), longer = maximum(lamp.half_across, lamp.half_along);
-  const T within = minimum(narrower, longer / slot.parts) * farthest;
-  const T tangent = within * facing / (T(1) + within * slant), tangent2 = tangent * tangent;
-  const T size2 = select(ball, of_ball, select(flat, tangent2 / (T(1) + tangent2), of_sun));
+  // Twice the squared cosine between the closure's normal and the cone's axis. The whole cone has to be above the
+  // horizon of that normal, and so does each of several.
+  const T rise2 = T(2) * dot(cone.towards, wo) + T(2);
+  const T diagonal = sqrt(sqr(lamp.half_across) + sqr(lamp.half_along)) * nearness;
+  const auto stays_above = [&](const T& sine, const T& reach) {
+    return rise2 > sqr(T(2) * sine + T(2 * kLeastRise) + reach);
+  };
+  const T height_of_lamp = dot(lamp.away, centre), facing = height_of_lamp * nearness;
+  const T narrower = minimum(lamp.half_across, lamp.half_along) * nearness;
+  cone.cones = cones_of_rectangle(slot, lamp, centre, T(1.5) < slot.most && stays_above(narrower, diagonal));
+  // The largest cone about the centre that fits within a disk: its rim touches the disk where the plane recedes.
+  const T tangent = narrower * facing / (T(1) + narrower * sqrt(T(1) - facing * facing)), tangent2 = tangent * tangent;
+  const T of_flat = select(kind < T(3.5), sqr(cone.cones.sine), tangent2 / (T(1) + tangent2));
+  const T size2 = select(ball, of_ball, select(flat, of_flat, of_sun));
   const T sine2 = maximum(size2, T(kPoint));
-  cone.sine = sqrt(sine2);
-  cone.drop = sine2 / (T(1) + sqrt(T(1) - sine2));
+  const auto drop_of = [](const T& of_sine2) { return of_sine2 / (T(1) + sqrt(T(1) - of_sine2)); };
+  cone.drop = drop_of(sine2);
+  const T of_others = drop_of(sqr(cone.cones.sine_of_others));
+  const T sum = cone.drop + (cone.cones.count - T(1)) * of_others;
+  cone.of_cones = sum * T(2 * kPi);
+  cone.share = select(T(1.5) < slot.most, cone.drop / sum, T(1));
+  cone.share_of_others = of_others / sum;
   // blender_addon/lamps/slots.py: the first size is negative for lamps that drawn directions don't hit.
   const auto hit = size2 > T(kPoint) && T(0) < slot.shape.y;
-  cone.solid_angle = select(hit, cone.drop * T(2 * kPi) * slot.parts, T(0));
-  // The cone of a rectangle carries all of the rectangle's light, so it must not be widened.
+  cone.solid_angle = select(hit, cone.of_cones, T(0));
+  // The cones of a rectangle carry all of the rectangle's light, so they must not be widened.
   cone.chord = sqrt(T(2) * cone.drop) + select(flat, T(0), T(2 * kNarrow));
-  const T diagonal = sqrt(sqr(lamp.half_across) + sqr(lamp.half_along));
-  cone.reach = select(flat, diagonal * nearness + T(2 * kNarrow), cone.chord);
+  cone.chord_of_others = sqrt(T(2) * of_others);
+  cone.reach = select(flat, diagonal + T(2 * kNarrow), cone.chord);
   cone.flat = select(flat, T(1), T(0));
-  // Twice the squared cosine between the closure's normal and the cone's axis. The whole cone, of every part, has to be
-  // above the horizon of that normal.
-  const T least = T(2) * cone.sine + T(2 * kLeastRise) + select(T(1.5) < slot.parts, cone.reach, T(0));
-  const T rise2 = T(2) * dot(cone.towards, wo) + T(2);
+  cone.cones.sine = sqrt(sine2);
   const auto used = kind > T(0.5);
-  const auto usable = used && sine2 < T(kWidest) && rise2 > least * least;
-  const auto shines_here = select(flat, height_of_lamp * nearness, T(1)) > T(0.01);
+  const auto usable = used && sine2 < T(kWidest) && stays_above(cone.cones.sine, T(0));
+  const auto shines_here = select(flat, facing, T(1)) > T(0.01);
   cone.used = select(used, T(1), T(0));
   cone.active = select(usable && shines_here, T(1), T(0));
   cone.above = select(T(0) < dot(cone.towards, normal) + cone.reach, T(1), T(0));
   return cone;
 }
 
-/// A part of a lamp, counted from 0 along the strip; every lamp has the first.
-template <class T> struct LampPart {
-  Vec3<T> towards;  ///< unit vector along the axis of its cone
-  T clear;  ///< the fraction of its cone that is above the horizon, or 0 if the lamp does not have so many parts
+/// One of the cones of a lamp, counted from 0.
+template <class T> struct ConeAt {
+  Vec3<T> towards;  ///< unit vector along its axis
+  T clear;          ///< the part of it that is above the horizon, or 0 if the lamp does not have so many cones
 };
-/// `normal`: see cone_of().
-template <class T> LampPart<T> part_of_strip(const LampSlot<T>& slot, const LampAxes<T>& lamp, const LampCone<T>& cone,
-                                             const Vec3<T>& at, const T& index, const Vec3<T>& normal) {
-  const T offset = (T(2) * index + T(1)) / slot.parts - T(1);
-  const Vec3<T> middle = lamp.strip * offset + (slot.place - at);
-  LampPart<T> part;
-  part.towards = select(T(1.5) < slot.parts, middle * (T(1) / sqrt(dot(middle, middle))), cone.towards);
+/// `x`, `y`: signs of the corner of the rectangle, 0 for the first cone. `normal`: see cone_of().
+template <class T> ConeAt<T> cone_at(const LampSlot<T>& slot, const LampCone<T>& cone, const Vec3<T>& at,
+                                     const T& index, const T& x, const T& y, const Vec3<T>& normal) {
+  const LampCones<T>& of = cone.cones;
+  const T along_row = T(2) * index / (of.in_row - T(1)) - T(1);
+  const Vec3<T> middle = slot.place - at + of.row * along_row + of.across * x + of.along * y;
+  ConeAt<T> out;
+  out.towards = select(T(1.5) < slot.most, middle * (T(1) / sqrt(dot(middle, middle))), cone.towards);
+  const T sine = select(index < T(0.5), of.sine, of.sine_of_others);
   // This approximates the part of a disk above a line, to 0.02.
-  const T x = maximum(minimum(dot(part.towards, normal) / cone.sine, T(1)), T(-1));
-  part.clear = select(index < slot.parts, x * (T(0.75) - T(0.25) * (x * x)) + T(0.5), T(0));
-  return part;
+  const T height = maximum(minimum(dot(out.towards, normal) / sine, T(1)), T(-1));
+  const T part = height * (T(0.75) - T(0.25) * (height * height)) + T(0.5);
+  out.clear = select(index < of.count, part, T(0));
+  return out;
 }
 
 /// The solid angle that a point of a rectangle or an ellipse stands for, divided by `of_cones`, that of all cones
@@ -165,7 +221,7 @@ template <class T> struct FlatPoint {
   T emphasis;  ///< emphasis_at() the point
 };
 template <class T> FlatPoint<T> flat_point(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
-                                           const T& drop, const T& u, const T& v) {
+                                           const T& of_cones, const T& u, const T& v) {
   const auto round = slot.kind > T(3.5);
   const T radius = sqrt(u), turn = T(2) * pi<T>() * v;
   const T x = select(round, radius * cos(turn), T(2) * u - T(1));
@@ -175,7 +231,7 @@ template <class T> FlatPoint<T> flat_point(const LampSlot<T>& slot, const LampAx
   FlatPoint<T> out;
   out.wi = p * (T(1) / sqrt(distance2));
   const T cosine = maximum(dot(lamp.away, out.wi), T(0));
-  out.emphasis = emphasis_at(slot, lamp, cosine, distance2, drop * T(2 * kPi) * slot.parts);
+  out.emphasis = emphasis_at(slot, lamp, cosine, distance2, of_cones);
   return out;
 }
 
@@ -213,32 +269,35 @@ template <class T> T kept(const T& weight, const T& u) {
   return select(u < chance, T(1), T(0)) / minimum(chance, T(1));
 }
 
-/// The inputs of the Toon closures, one for each part, that carry `value`, as f cos, over the cone: as much of it as
-/// part_of_lamp() says. For a ball or a sun it may be wider than the cone.
+/// The inputs of a Toon closure.
 template <class T> struct ToonLobe {
   Rgb<T> color;
   T size;  ///< in units of 90 degrees, as in the node
 };
+/// The Toon closures of a lamp, which carry `value`, as f cos, over its cones: as much of it as part_of_lamp() says.
+/// For a ball or a sun it may be wider than the cone.
+template <class T> struct ToonLobes { ToonLobe<T> first, others; };
 /// `room`: the radius that it may have without covering another lamp. `emphasis`, `density`: at the point where the
 /// value is taken.
-template <class T> ToonLobe<T> toon_lobe(const T& parts, const LampCone<T>& cone, const T& emphasis, const T& density,
-                                         const T& room, const Rgb<T>& value, const T& u) {
+template <class T> ToonLobes<T> toon_lobes(const LampCone<T>& cone, const T& emphasis, const T& density, const T& room,
+                                           const Rgb<T>& value, const T& u) {
   constexpr double kWidened = 2e-4;
   // f is averaged over the whole lamp, with zeros below the horizon, and the surface hides that part of the cones. If a
   // smaller part of them is above the horizon, light is lost; otherwise few samples would have to carry it.
   constexpr double kLeastPart = 0.05;
-  const T whole = parts / maximum(cone.clear, T(kLeastPart) * parts);
-  const T factor = emphasis * whole * part_of_lamp(cone, emphasis, density);
+  const T factor = emphasis * part_of_lamp(cone, emphasis, density) / maximum(cone.clear, T(kLeastPart));
   const T largest = max_component(value) * factor;
   const T wide = minimum(sqrt(T(kWidened / kPi) / largest), room);
-  const T chord = maximum(cone.chord, select(cone.flat > T(0.5), T(0), wide)), chord2 = chord * chord;
-  const T extent = chord2 * T(kPi);
-  ToonLobe<T> out;
-  // The angle 2 asin(chord / 2), with a relative error of 1e-4.
-  out.size = chord * (T(2 / kPi) +
-                      chord2 * (T(2 / kPi / 24) + chord2 * (T(2 / kPi * 3 / 640) + chord2 * T(2 / kPi * 5 / 7168))));
-  out.color = value * (factor * extent * kept(largest * extent, u));
-  return out;
+  const auto lobe = [&](const T& chord) {
+    const T chord2 = chord * chord, extent = chord2 * T(kPi);
+    ToonLobe<T> out;
+    // The angle 2 asin(chord / 2), with a relative error of 1e-4.
+    out.size = chord * (T(2 / kPi) +
+                        chord2 * (T(2 / kPi / 24) + chord2 * (T(2 / kPi * 3 / 640) + chord2 * T(2 / kPi * 5 / 7168))));
+    out.color = value * (factor * extent * kept(largest * extent, u));
+    return out;
+  };
+  return {lobe(maximum(cone.chord, select(cone.flat > T(0.5), T(0), wide))), lobe(cone.chord_of_others)};
 }
 
 /// The largest radius of a cone that is widened beyond its lamp.

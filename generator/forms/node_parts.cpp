@@ -30,19 +30,18 @@ template <class Outputs> NodeProgram recorded(const Outputs& outputs) {
 }
 
 LampSlot<Expr> slot_input() {
-  return {input3("place"), input3("turn"), input3("scale"), input3("shape"), Expr::input("kind"), Expr::input("parts")};
+  return {input3("place"), input3("turn"), input3("scale"), input3("shape"), Expr::input("kind"), Expr::input("most")};
 }
 LampAxes<Expr> axes_input() {
-  return {input3("across"),           input3("along"),           input3("away"),
-          Expr::input("half_across"), Expr::input("half_along"), input3("strip")};
+  return {input3("across"), input3("along"), input3("away"), Expr::input("half_across"), Expr::input("half_along")};
 }
 
 }  // namespace
 
 const std::set<std::string>& node_vectors() {
-  static const std::set<std::string> names = {"across", "along", "at",    "away",  "normal", "part",
-                                              "place",  "ray",   "scale", "shape", "strip",  "towards",
-                                              "true",   "turn",  "view",  "wi",    "wo"};
+  static const std::set<std::string> names = {
+      "across", "along", "at",    "away",    "axis", "corner_across", "corner_along", "normal", "place", "ray",
+      "row",    "scale", "shape", "towards", "true", "turn",          "view",         "wi",     "wo"};
   return names;
 }
 
@@ -77,7 +76,6 @@ NodeProgram record_axes() {
     p.output("away", axes.away);
     p.output("half_across", axes.half_across);
     p.output("half_along", axes.half_along);
-    p.output("strip", axes.strip);
   });
 }
 NodeProgram record_cone() {
@@ -85,30 +83,41 @@ NodeProgram record_cone() {
     const LampCone<Expr> cone = cone_of(slot_input(), axes_input(), input3("at"), input3("view"), input3("normal"));
     p.output("towards", cone.towards);
     p.output("drop", cone.drop);
+    p.output("of_cones", cone.of_cones);
     p.output("solid_angle", cone.solid_angle);
     p.output("chord", cone.chord);
+    p.output("chord_of_others", cone.chord_of_others);
     p.output("reach", cone.reach);
     p.output("flat", cone.flat);
     p.output("used", cone.used);
     p.output("active", cone.active);
     p.output("above", cone.above);
-    p.output("sine", cone.sine);
+    p.output("share", cone.share);
+    p.output("share_of_others", cone.share_of_others);
+    p.output("count", cone.cones.count);
+    p.output("sine", cone.cones.sine);
+    p.output("sine_of_others", cone.cones.sine_of_others);
+    p.output("in_row", cone.cones.in_row);
+    p.output("row", cone.cones.row);
+    p.output("corner_across", cone.cones.across);
+    p.output("corner_along", cone.cones.along);
   });
 }
-NodeProgram record_part() {
+NodeProgram record_cone_at() {
   return recorded([](Program& p) {
     LampCone<Expr> cone;
     cone.towards = input3("towards");
-    cone.sine = Expr::input("sine");
-    const LampPart<Expr> part =
-        part_of_strip(slot_input(), axes_input(), cone, input3("at"), Expr::input("index"), input3("normal"));
-    p.output("part", part.towards);
-    p.output("clear", part.clear);
+    cone.cones = {Expr::input("count"), Expr::input("sine"),     Expr::input("sine_of_others"), Expr::input("in_row"),
+                  input3("row"),        input3("corner_across"), input3("corner_along")};
+    const ConeAt<Expr> one = cone_at(slot_input(), cone, input3("at"), Expr::input("index"), Expr::input("x"),
+                                     Expr::input("y"), input3("normal"));
+    p.output("axis", one.towards);
+    p.output("clear", one.clear);
   });
 }
 NodeProgram record_flat() {
   return recorded([](Program& p) {
-    const FlatPoint<Expr> point = flat_point(slot_input(), axes_input(), input3("at"), Expr::input("drop"),
+    const FlatPoint<Expr> point = flat_point(slot_input(), axes_input(), input3("at"), Expr::input("of_cones"),
                                              Expr::input("u_0"), Expr::input("u_1"));
     p.output("wi", point.wi);
     p.output("emphasis", point.emphasis);
@@ -127,14 +136,17 @@ NodeProgram record_lobe() {
   return recorded([](Program& p) {
     LampCone<Expr> cone;
     cone.chord = Expr::input("chord");
+    cone.chord_of_others = Expr::input("chord_of_others");
     cone.flat = Expr::input("flat");
     cone.solid_angle = Expr::input("solid_angle");
     cone.clear = Expr::input("clear");
     const Expr emphasis = select(cone.flat > Expr(0.5), Expr::input("emphasis"), Expr(1.0));
-    const ToonLobe<Expr> lobe = toon_lobe(Expr::input("parts"), cone, emphasis, Expr::input("density"),
-                                          Expr::input("room"), Rgb<Expr>::input("value"), Expr::input("u_2"));
-    p.output("color", lobe.color);
-    p.output("size", lobe.size);
+    const ToonLobes<Expr> lobes = toon_lobes(cone, emphasis, Expr::input("density"), Expr::input("room"),
+                                             Rgb<Expr>::input("value"), Expr::input("u_2"));
+    p.output("color", lobes.first.color);
+    p.output("size", lobes.first.size);
+    p.output("color_of_others", lobes.others.color);
+    p.output("size_of_others", lobes.others.size);
   });
 }
 NodeProgram record_rest() {

@@ -19,7 +19,7 @@ print::NodeProgram record_raise();
 print::NodeProgram record_axes();
 print::NodeProgram record_cone();
 /// The part of a rectangle with this index.
-print::NodeProgram record_part();
+print::NodeProgram record_cone_at();
 print::NodeProgram record_flat();
 print::NodeProgram record_met();
 print::NodeProgram record_lobe();

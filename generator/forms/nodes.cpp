@@ -38,6 +38,8 @@ const char* kind_of(ClosureKind kind) {
       return "cone";
     case ClosureKind::Ggx:
       return "ggx";
+    case ClosureKind::Beckmann:
+      return "beckmann";
     case ClosureKind::Reflection:
       return "mirror";
     default:
@@ -55,37 +57,50 @@ std::optional<ClosureSum<Expr>> native_closures(const Model& model, const Brdf<E
 }
 
 /// Closures that are nowhere brighter than the model. Choices must be bound. The sockets of the closures are outputs of
-/// the program. The program reads `stands`, which is 0 where normals are bent and Cycles would darken the closures, and
-/// `camera`, which is 1 for camera rays: for other rays, Filter Glossy increases the roughness of microfacets. The
-/// returned closures have these outputs as inputs, for use in other programs.
+/// the program. The program reads `stands`, which is 0 where normals are bent and Cycles would darken matte closures,
+/// and `camera`, which is 1 for camera rays: for other rays, Filter Glossy increases the roughness of microfacets. The
+/// returned closures have these weights as inputs, for use in other programs.
 ClosureSum<Expr> record_base(const Model& model, const ParamValues& fixed, const Brdf<Expr>& brdf, Program& program,
                              Json& closures) {
   const Under* of = under(model);
   if (!of || measure::two_sided(model, brdf)) return {};
   ClosureSum<Expr> sum = of->record(model.info(), fixed, input3("wo"));
+  ClosureSum<Expr> used;
   for (std::size_t i = 0; i < sum.size(); ++i) {
     Closure<Expr>& c = sum[i];
-    const bool rough_matte = c.kind == ClosureKind::OrenNayar;  // the node has an albedo, and no weight beside it
-    Rgb<Expr>& colour = rough_matte ? c.albedo : c.weight;
-    colour = colour * Expr::input("stands");
-    Json closure = {{"kind", kind_of(c.kind)}, {"weight", fmt::format("{}_{}", rough_matte ? "albedo" : "weight", i)}};
-    if (rough_matte) closure["roughness"] = fmt::format("roughness_{}", i);
+    Json closure = {{"kind", kind_of(c.kind)}};
+    const auto output = [&](const char* socket, const auto& value) {
+      const std::string name = fmt::format("{}_{}", socket, i);
+      closure[socket] = name;
+      program.output(name, value);
+    };
+    const bool is_rough_matte = c.kind == ClosureKind::OrenNayar;  // the node has an albedo, and no weight beside it
+    Rgb<Expr>& color = is_rough_matte ? c.albedo : c.weight;
+    std::array<double, 3> known{1, 1, 1};
+    const bool is_black = color.is_constant(&known) && known == std::array<double, 3>{};
+    // Facets are not matte, so bent normals do not darken them.
+    output("weight", color * Expr::input(has_facets(c.kind) ? "camera" : "stands"));
+    if (is_rough_matte) output("roughness", c.roughness);
     if (has_facets(c.kind)) {
-      c.weight = c.weight * Expr::input("camera");
-      closure["roughness"] = fmt::format("roughness_{}", i);
-      program.output(closure["roughness"], sqrt(c.alpha));
+      // As Blender's Glossy node has it: with r its squared Roughness, alpha is r (1 - anisotropy) along the tangent
+      // and r / (1 - anisotropy) across it, or r / (1 + anisotropy) and r (1 + anisotropy) if it is negative.
+      const bool is_stretched = c.stretched != Tangent::None;
+      const Expr mean = is_stretched ? sqrt(c.alpha * c.alpha_across) : c.alpha;
+      output("roughness", sqrt(mean));
+      if (is_stretched)
+        output("anisotropy",
+               select(c.alpha < c.alpha_across, Expr(1) - c.alpha / mean, c.alpha_across / mean - Expr(1)));
     }
     if (has_cone(c.kind)) {
-      closure["size"] = fmt::format("size_{}", i);
-      closure["smooth"] = fmt::format("smooth_{}", i);
+      output("size", c.size);
+      output("smooth", c.smooth);
     }
     closures.push_back(closure);
+    if (is_black) continue;
+    color = Rgb<Expr>::input(closure["weight"]);
+    used.push_back(c);
   }
-  output_closures(sum, program);
-  ClosureSum<Expr> inputs = input_closures(sum);
-  for (Closure<Expr>& c : inputs)
-    if (c.kind == ClosureKind::OrenNayar) c.weight = Rgb<Expr>(Expr(1));
-  return inputs;
+  return used;
 }
 
 ParamValues default_choices(const ModelInfo& info) {
@@ -133,9 +148,10 @@ NodeRecording record_nodes(const Model& model, const ParamValues& fixed) {
   const Vec3<Expr> wo = input3("wo"), wi = input3("wi");
   const ClosureSum<Expr> base = record_base(model, fixed, *brdf, out.base, out.of_base);
   const Rgb<Expr> f = brdf->eval(wi, wo) * abs(wi.z);
+  const bool has_base = !out.of_base.empty();
   out.value.output("value", base.empty() ? f : f - evaluate(base, wi, wo));
   out.value.output("density", brdf->pdf(wi, wo));
-  const Under* of = base.empty() ? nullptr : under(model);
+  const Under* of = has_base ? under(model) : nullptr;
   const Sample<Expr> s = of && of->sample ? of->sample(model.info(), fixed, wo, recorded_u(), Expr::input("stands"))
                                           : brdf->sample(wo, recorded_u());
   out.draw.output("wi", s.wi);
@@ -281,7 +297,7 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
   if (lamps) {
     add("axes", record_axes());
     add("cone", record_cone());
-    add("part", record_part());
+    add("cone_at", record_cone_at());
     add("flat", record_flat());
     add("met", record_met());
     add("lobe", record_lobe());

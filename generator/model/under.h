@@ -4,8 +4,8 @@
 //
 // A model declares them as under(wo), and registers that with BRDFC_UNDER after BRDFC_MODEL. For any parameters and
 // directions their sum is at most f cos(theta_i); weights are not negative. They are of kinds that Blender has a node
-// for: Diffuse, OrenNayar with the weight 1, DiffuseToon, and Ggx with one roughness, all about the surface's normal,
-// the same for all choices.
+// for: Diffuse, OrenNayar with the weight 1, DiffuseToon, Ggx and Beckmann, all about the surface's normal and, if
+// anisotropic, the x axis. For all choices they are the same; a choice may have the weight 0.
 #pragma once
 
 #include <array>

@@ -38,6 +38,7 @@
 // d'Eon: Importance Sampling Microfacet-Based BSDFs using the Distribution of Visible Normals, EGSR 2014). Smith's
 // beckmann takes these as well: its own need the inverse of an error function.
 #include "model/base_terms.h"
+#include "model/under.h"
 #include "model/v_cavity.h"
 
 namespace brdfc {
@@ -219,8 +220,17 @@ template <class T> struct Microfacet {
     return {facets(ClosureKind::Ggx, is_beckmann() ? none : weight, ax, ay, T(0)),
             facets(ClosureKind::Beckmann, is_beckmann() ? weight : none, ax, ay, T(0))};
   }
+
+  /// Cycles' closures, if the masking is theirs, with the least F: S is at least f0, and q at most 1.
+  ClosureSum<T> under(const Vec3<T>& wo) const {
+    const Rgb<T> least = f0 * tint * compensation(wo), none(T(0));
+    const auto weight = [&](bool is_this) { return is_this && has_masking(SmithCorrelated) ? least : none; };
+    return {facets(ClosureKind::Ggx, weight(!is_beckmann()), ax, ay, T(0)),
+            facets(ClosureKind::Beckmann, weight(is_beckmann()), ax, ay, T(0))};
+  }
 };
 
 BRDFC_MODEL(Microfacet)
+BRDFC_UNDER(Microfacet)
 
 }  // namespace brdfc

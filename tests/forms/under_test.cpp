@@ -59,6 +59,9 @@ const UnderRow kUnderRows[] = {{"ashikhmin_shirley", {"rs=0,0,0"}, 0.9},
                                {"coupled", {}, 0.94},
                                {"eon", {}, 0.97},
                                {"eon", {"rho=1"}, 0.999999},
+                               {"microfacet", {}, 0.9},
+                               {"microfacet", {"distribution=multiscatter_ggx", "ax=0.6", "ay=0.6"}, 0.9},
+                               {"microfacet", {"distribution=beckmann", "ax=0.5", "ay=0.1"}, 0.9},
                                {"oren_nayar", {}, 0.75},
                                {"oren_nayar", {"form=qualitative"}, 0.9},
                                {"phong_material", {"ks=0", "kr=0"}, 0.999},
@@ -99,14 +102,15 @@ TEST(Under, IsRecordedAlikeForAllChoices) {
       std::vector<ClosureKind> here;
       for (const Closure<Expr>& c : of->record(m->info(), with_choices(m->info(), choices), input3("wo"))) {
         EXPECT_TRUE(c.kind == ClosureKind::Diffuse || c.kind == ClosureKind::OrenNayar ||
-                    c.kind == ClosureKind::DiffuseToon || c.kind == ClosureKind::Ggx)
+                    c.kind == ClosureKind::DiffuseToon || has_facets(c.kind))
             << name;
         // Blender's node has no weight beside the albedo.
         std::array<double, 3> weight;
         EXPECT_TRUE(c.kind != ClosureKind::OrenNayar ||
                     (c.weight.is_constant(&weight) && weight == std::array{1.0, 1.0, 1.0}))
             << name;
-        EXPECT_FALSE(c.turned || c.stretched != Tangent::None) << name;
+        EXPECT_FALSE(c.turned || c.stretched == Tangent::View) << name;
+        EXPECT_TRUE(c.tangent.x.is_literal(1) && c.tangent.y.is_literal(0) && c.tangent.z.is_literal(0)) << name;
         here.push_back(c.kind);
       }
       if (kinds.empty()) kinds = here;
