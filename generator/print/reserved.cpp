@@ -12,8 +12,8 @@ const std::set<std::string>& osl_function_words() {
 }
 
 const std::set<std::string>& python_arguments() {
-  static const std::set<std::string> words = {"cos_theta_o", "material", "model", "phi_o", "representation",
-                                              "samples",     "self",     "u",     "wi",    "wo"};
+  static const std::set<std::string> words = {"cos_theta_o", "material", "model", "node", "phi_o", "representation",
+                                              "samples",     "self",     "u",     "wi",   "wo"};
   return words;
 }
 
