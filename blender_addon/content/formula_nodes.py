@@ -118,7 +118,6 @@ _SEEN = [
     ["of_cones", "FLOAT"],
     ["solid_angle", "FLOAT"],
     ["chord", "FLOAT"],
-    ["chord_of_others", "FLOAT"],
     ["reach", "FLOAT"],
     ["flat", "FLOAT"],
     ["used", "FLOAT"],
@@ -137,9 +136,8 @@ _AXES = [
     ["half_across", "FLOAT"],
     ["half_along", "FLOAT"],
 ]
-#: Axes of the cones of a lamp, and the corners in which they may lie.
+#: Axes of the cones of a lamp.
 _CONES = [[f"axis {i}", "VECTOR"] for i in range(slots.MOST_CONES)]
-_CORNERS = ((0.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
 #: Larger than the angle between any two directions.
 _FAR = 4.0
 
@@ -166,18 +164,17 @@ def _seen_group(parts):
         known |= here.add("axes", **known)
         known |= here.add("cone", **known)
         clear = 0.0
-        for i, ((name, _), (x, y)) in enumerate(zip(_CONES, _CORNERS, strict=True)):
-            cone = here.add("cone_at", **known, index=float(i), x=x, y=y)
+        for i, (name, _) in enumerate(_CONES):
+            cone = here.add("cone_at", **known, index=float(i))
             known[name] = cone["axis"]
-            share = known["share" if i == 0 else "share_of_others"]
-            clear = w.math("MULTIPLY_ADD", cone["clear"], share, clear)
+            clear = w.math("ADD", clear, cone["clear"])
         return {name: (known | {"clear": clear})[name] for name, _ in outputs}
 
     outputs = _SEEN + _CODED + _AXES + _CONES
     content = [
         "seen",
         slots.CODE,
-        _CORNERS,
+        slots.MOST_CONES,
         [parts.data[name] for name in ("axes", "cone", "cone_at")],
     ]
     inputs = [[name, "VECTOR"] for name in vectors]
@@ -199,8 +196,8 @@ def _lamp_group(parts):
     value at one of its points, or the part of it that random directions leave. Cycles skips its
     computations where the factor `lit` is 0."""
     vectors = (*_SLOT, "towards", "at", "view", "tangent", "bitangent", "normal", "anywhere")
-    of_cone = ("chord", "chord_of_others", "flat", "room", "solid_angle", "clear")
-    numbers = (*of_cone, "of_cones", "most", "count", "drop", "lit", "u_0", "u_1", "u_2")
+    of_cone = ("chord", "flat", "room", "solid_angle", "clear", "count")
+    numbers = (*of_cone, "of_cones", "most", "drop", "lit", "u_0", "u_1", "u_2")
     inputs = [[name, "VECTOR"] for name in vectors] + [[name, "FLOAT"] for name in numbers]
     inputs += [["kind", "FLOAT"], *_AXES, *_CONES]
     inputs += [[name, kind] for name, kind in parts.inputs("value").items() if name != "wi"]
@@ -217,14 +214,14 @@ def _lamp_group(parts):
         cone = {name: found[name] for name in of_cone}
         cone |= {"emphasis": on_flat["emphasis"], "u_2": found["u_2"]}
         lobe = here.add("lobe", **at_point, **cone)
-        halves = [w.half(found[name], found["view"]) for name, _ in _CONES]
-        cones = [w.toon(lobe["color"], lobe["size"], halves[0])]
-        for i, half in enumerate(halves[1:], 1):
-            toon = w.toon(lobe["color_of_others"], lobe["size_of_others"], half)
+        cones = []
+        for i, (name, _) in enumerate(_CONES):
+            half = w.half(found[name], found["view"])
+            toon = w.toon(lobe["color"], lobe["size"], half)
             # The first factor is a constant, with which Cycles removes what a lamp never has.
             may_exist = w.math("GREATER_THAN", found["most"], i + 0.5)
             exists = w.math("MULTIPLY", may_exist, w.math("GREATER_THAN", found["count"], i + 0.5))
-            cones.append(w.shown(exists, toon))
+            cones.append(w.shown(exists, toon) if i > 0 else toon)
         return {"BSDF": w.shown(found["lit"], w.sum(cones))}
 
     used = ("value", "flat", "lobe")

@@ -23,7 +23,7 @@ EMPTY, BALL, SUN, RECTANGLE, ELLIPSE, SKY_SUN = range(6)
 #: them.
 CODE = 8.0
 #: Most cones of a rectangle. Formula Nodes have a closure for each.
-MOST_CONES = 5
+MOST_CONES = 4
 #: Index of that number in a slot.
 _SHAPE = 9
 

@@ -11,13 +11,12 @@
 // that is small for the lobe. The two parts add up to f cos in every direction.
 //
 // A ball or a sun fills its cone. A rectangle or an ellipse does not, so its closures carry the light of the whole
-// lamp. An ellipse has the largest cone that fits into it. A rectangle has up to five cones, which cover most of it as
-// seen from the shading point: the largest in the middle and one of half its width in each corner, or, if the
-// rectangle looks more than twice as long as wide, a row. They may overlap, since only their sum counts. All of them
-// carry the same value, so that the model's formula runs once. Cycles drops closures with a small weight, so the cone
-// of a small lamp is widened until it carries kWidened of the light; that share of the light beside the lamp then
-// counts twice. If the cones of two lamps overlap, the earlier lamp in the list, which is sorted by size with the
-// widest first, is left to drawn directions. Otherwise light in the overlap would count twice.
+// lamp. An ellipse has the largest cone that fits into it. A rectangle has up to four in a row, along the axis that
+// looks longer from the shading point. They may overlap, since only their sum counts. All of them carry the same value,
+// so that the model's formula runs once. Cycles drops closures with a small weight, so the cone of a small lamp is
+// widened until it carries kWidened of the light; that share of the light beside the lamp then counts twice. If the
+// cones of two lamps overlap, the earlier lamp in the list, which is sorted by size with the widest first, is left to
+// drawn directions. Otherwise light in the overlap would count twice.
 //
 // The formulas run only as nodes (print/node_program.h), for which a division by 0 and the root of a negative number
 // give 0.
@@ -54,14 +53,11 @@ template <class T> LampAxes<T> lamp_axes(const LampSlot<T>& slot) {
   return axes;
 }
 
-/// The cones of a rectangle, as seen from a shading point. Their middles are those of the lamp moved by `row` times a
-/// number in [-1, 1], and by `across` and `along` times -1 or 1.
+/// The cones of a rectangle, as seen from a shading point: equal ones in a row along the axis that looks longer.
 template <class T> struct LampCones {
   T count;
-  T sine, sine_of_others;  ///< of the radius of the first cone and of each other one
-  T in_row;                ///< number of cones in the row; 1 if the others are in the corners
-  Vec3<T> row;             ///< half the distance between the first and the last of a row
-  Vec3<T> across, along;   ///< half the distance between corners
+  T sine;       ///< of their radius
+  Vec3<T> row;  ///< half the distance between the middles of the first and the last
 };
 /// `centre`: from the shading point to the middle of the lamp. `many`: whether there may be more than one cone.
 ///
@@ -71,6 +67,8 @@ template <class T> struct LampCones {
 /// point C + tA of the lamp it is (1 - t) times that, with |C + tA| in place of |C|.
 template <class T, class Bool> LampCones<T> cones_of_rectangle(const LampSlot<T>& slot, const LampAxes<T>& lamp,
                                                                const Vec3<T>& centre, const Bool& many) {
+  // From this ratio of the sides on, two overlapping cones have less variance than one.
+  constexpr double kTwo = 1.1;
   const Vec3<T> a = lamp.across * lamp.half_across, b = lamp.along * lamp.half_along;
   const T a2 = sqr(lamp.half_across), b2 = sqr(lamp.half_along), c2 = dot(centre, centre);
   const T ac = abs(dot(a, centre)), bc = abs(dot(b, centre));
@@ -78,24 +76,14 @@ template <class T, class Bool> LampCones<T> cones_of_rectangle(const LampSlot<T>
   const T at_a2 = b2 * (c2 + a2 + T(2) * ac) - sqr(bc), at_b2 = a2 * (c2 + b2 + T(2) * bc) - sqr(ac);
   const auto a_is_longer = at_a2 < at_b2;
   const T longer2 = maximum(at_a2, at_b2), ratio = sqrt(longer2 / minimum(at_a2, at_b2));
-  const T nearest = lamp.half_across * lamp.half_along * abs(dot(lamp.away, centre)) / sqrt(longer2);
+  const auto more_than = [&](double limit) { return select(T(limit) < ratio, T(1), T(0)); };
   LampCones<T> cones;
-  // Found by counting how often each point of a rectangle is covered: of the patterns of five circles, the corners have
-  // the least variance up to a ratio of 2, and beyond it the row with the fewest circles that leave no gaps.
-  const auto corners = many && T(4.5) < slot.most && ratio < T(2);
-  const T longer_than =
-      select(T(2) < ratio, T(1), T(0)) + select(T(3) < ratio, T(1), T(0)) + select(T(4) < ratio, T(1), T(0));
-  cones.in_row = select(many && !corners, minimum(slot.most, T(2) + longer_than), T(1));
-  cones.count = select(corners, T(5), cones.in_row);
-  const T moved = select(T(1.5) < cones.in_row, T(1) - T(1) / ratio, T(0)), halves = select(corners, T(0.5), T(0));
+  cones.count = select(many, minimum(slot.most, T(1) + more_than(kTwo) + more_than(2) + more_than(3)), T(1));
+  const T moved = select(T(1.5) < cones.count, T(1) - T(1) / ratio, T(0));
   cones.row = select(a_is_longer, a, b) * moved;
-  cones.across = a * halves;
-  cones.along = b * halves;
-  // All cones of a row have the size of the farthest one, and so have those in the corners.
+  // All have the size of the farthest one.
   const T end2 = c2 + moved * (moved * select(a_is_longer, a2, b2) + T(2) * select(a_is_longer, ac, bc));
-  const T corner2 = c2 + T(0.25) * (a2 + b2) + ac + bc;
-  cones.sine = nearest / sqrt(end2);
-  cones.sine_of_others = select(corners, nearest * T(0.5) / sqrt(corner2), cones.sine);
+  cones.sine = lamp.half_across * lamp.half_along * abs(dot(lamp.away, centre)) / sqrt(longer2 * end2);
   return cones;
 }
 
@@ -104,19 +92,16 @@ template <class T, class Bool> LampCones<T> cones_of_rectangle(const LampSlot<T>
 template <class T> struct LampCone {
   Vec3<T> towards;     ///< unit vector to the middle of the lamp
   LampCones<T> cones;  ///< of a rectangle
-  T drop;              ///< 1 - cos of the radius of the lamp, or of its first cone
+  T drop;              ///< 1 - cos of the radius of the lamp, or of each of its cones
   T of_cones;          ///< solid angle of all cones
   T solid_angle;       ///< the same, or 0 for a lamp that drawn directions can't hit
-  T share;             ///< of the first cone, in the solid angle of all
-  T share_of_others;   ///< of each other one
   T chord;             ///< radius of the closure; for a ball or a sun it includes a seam
-  T chord_of_others;   ///< the same for the other cones
   T reach;             ///< radius of a cone around the whole lamp
   T flat;              ///< 1 for a rectangle or an ellipse, otherwise 0
   T used;              ///< 0 for an empty slot, otherwise 1
   T active;            ///< 0 for an empty slot and for a lamp that is left to drawn directions, otherwise 1
   T above;             ///< 1 if a part of the lamp is above the horizon, otherwise 0
-  T clear;             ///< the part of all cones that is above the horizon: see cone_at()
+  T clear;             ///< the number of cones above the horizon, with fractions: see cone_at()
 };
 
 /// Half the width of the lobe of a drawn direction, which is also its minimum distance from lamps.
@@ -160,19 +145,13 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& slot, const LampAxes<T
   const T of_flat = select(kind < T(3.5), sqr(cone.cones.sine), tangent2 / (T(1) + tangent2));
   const T size2 = select(ball, of_ball, select(flat, of_flat, of_sun));
   const T sine2 = maximum(size2, T(kPoint));
-  const auto drop_of = [](const T& of_sine2) { return of_sine2 / (T(1) + sqrt(T(1) - of_sine2)); };
-  cone.drop = drop_of(sine2);
-  const T of_others = drop_of(sqr(cone.cones.sine_of_others));
-  const T sum = cone.drop + (cone.cones.count - T(1)) * of_others;
-  cone.of_cones = sum * T(2 * kPi);
-  cone.share = select(T(1.5) < slot.most, cone.drop / sum, T(1));
-  cone.share_of_others = of_others / sum;
+  cone.drop = sine2 / (T(1) + sqrt(T(1) - sine2));
+  cone.of_cones = cone.cones.count * cone.drop * T(2 * kPi);
   // blender_addon/lamps/slots.py: the first size is negative for lamps that drawn directions don't hit.
   const auto hit = size2 > T(kPoint) && T(0) < slot.shape.y;
   cone.solid_angle = select(hit, cone.of_cones, T(0));
   // The cones of a rectangle carry all of the rectangle's light, so they must not be widened.
   cone.chord = sqrt(T(2) * cone.drop) + select(flat, T(0), T(2 * kNarrow));
-  cone.chord_of_others = sqrt(T(2) * of_others);
   cone.reach = select(flat, diagonal + T(2 * kNarrow), cone.chord);
   cone.flat = select(flat, T(1), T(0));
   cone.cones.sine = sqrt(sine2);
@@ -190,17 +169,16 @@ template <class T> struct ConeAt {
   Vec3<T> towards;  ///< unit vector along its axis
   T clear;          ///< the part of it that is above the horizon, or 0 if the lamp does not have so many cones
 };
-/// `x`, `y`: signs of the corner of the rectangle, 0 for the first cone. `normal`: see cone_of().
+/// `normal`: see cone_of().
 template <class T> ConeAt<T> cone_at(const LampSlot<T>& slot, const LampCone<T>& cone, const Vec3<T>& at,
-                                     const T& index, const T& x, const T& y, const Vec3<T>& normal) {
+                                     const T& index, const Vec3<T>& normal) {
   const LampCones<T>& of = cone.cones;
-  const T along_row = T(2) * index / (of.in_row - T(1)) - T(1);
-  const Vec3<T> middle = slot.place - at + of.row * along_row + of.across * x + of.along * y;
+  const T along_row = T(2) * index / (of.count - T(1)) - T(1);
+  const Vec3<T> middle = slot.place - at + of.row * along_row;
   ConeAt<T> out;
   out.towards = select(T(1.5) < slot.most, middle * (T(1) / sqrt(dot(middle, middle))), cone.towards);
-  const T sine = select(index < T(0.5), of.sine, of.sine_of_others);
   // This approximates the part of a disk above a line, to 0.02.
-  const T height = maximum(minimum(dot(out.towards, normal) / sine, T(1)), T(-1));
+  const T height = maximum(minimum(dot(out.towards, normal) / of.sine, T(1)), T(-1));
   const T part = height * (T(0.75) - T(0.25) * (height * height)) + T(0.5);
   out.clear = select(index < of.count, part, T(0));
   return out;
@@ -269,35 +247,32 @@ template <class T> T kept(const T& weight, const T& u) {
   return select(u < chance, T(1), T(0)) / minimum(chance, T(1));
 }
 
-/// The inputs of a Toon closure.
+/// The inputs of the Toon closures, one for each cone, that carry `value`, as f cos, over it: as much of it as
+/// part_of_lamp() says. For a ball or a sun the closure may be wider than the cone.
 template <class T> struct ToonLobe {
   Rgb<T> color;
   T size;  ///< in units of 90 degrees, as in the node
 };
-/// The Toon closures of a lamp, which carry `value`, as f cos, over its cones: as much of it as part_of_lamp() says.
-/// For a ball or a sun it may be wider than the cone.
-template <class T> struct ToonLobes { ToonLobe<T> first, others; };
 /// `room`: the radius that it may have without covering another lamp. `emphasis`, `density`: at the point where the
 /// value is taken.
-template <class T> ToonLobes<T> toon_lobes(const LampCone<T>& cone, const T& emphasis, const T& density, const T& room,
-                                           const Rgb<T>& value, const T& u) {
+template <class T> ToonLobe<T> toon_lobe(const LampCone<T>& cone, const T& emphasis, const T& density, const T& room,
+                                         const Rgb<T>& value, const T& u) {
   constexpr double kWidened = 2e-4;
   // f is averaged over the whole lamp, with zeros below the horizon, and the surface hides that part of the cones. If a
   // smaller part of them is above the horizon, light is lost; otherwise few samples would have to carry it.
   constexpr double kLeastPart = 0.05;
-  const T factor = emphasis * part_of_lamp(cone, emphasis, density) / maximum(cone.clear, T(kLeastPart));
+  const T whole = cone.cones.count / maximum(cone.clear, T(kLeastPart) * cone.cones.count);
+  const T factor = emphasis * whole * part_of_lamp(cone, emphasis, density);
   const T largest = max_component(value) * factor;
   const T wide = minimum(sqrt(T(kWidened / kPi) / largest), room);
-  const auto lobe = [&](const T& chord) {
-    const T chord2 = chord * chord, extent = chord2 * T(kPi);
-    ToonLobe<T> out;
-    // The angle 2 asin(chord / 2), with a relative error of 1e-4.
-    out.size = chord * (T(2 / kPi) +
-                        chord2 * (T(2 / kPi / 24) + chord2 * (T(2 / kPi * 3 / 640) + chord2 * T(2 / kPi * 5 / 7168))));
-    out.color = value * (factor * extent * kept(largest * extent, u));
-    return out;
-  };
-  return {lobe(maximum(cone.chord, select(cone.flat > T(0.5), T(0), wide))), lobe(cone.chord_of_others)};
+  const T chord = maximum(cone.chord, select(cone.flat > T(0.5), T(0), wide)), chord2 = chord * chord;
+  const T extent = chord2 * T(kPi);
+  ToonLobe<T> out;
+  // The angle 2 asin(chord / 2), with a relative error of 1e-4.
+  out.size = chord * (T(2 / kPi) +
+                      chord2 * (T(2 / kPi / 24) + chord2 * (T(2 / kPi * 3 / 640) + chord2 * T(2 / kPi * 5 / 7168))));
+  out.color = value * (factor * extent * kept(largest * extent, u));
+  return out;
 }
 
 /// The largest radius of a cone that is widened beyond its lamp.

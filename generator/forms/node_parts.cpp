@@ -39,9 +39,9 @@ LampAxes<Expr> axes_input() {
 }  // namespace
 
 const std::set<std::string>& node_vectors() {
-  static const std::set<std::string> names = {
-      "across", "along", "at",    "away",    "axis", "corner_across", "corner_along", "normal", "place", "ray",
-      "row",    "scale", "shape", "towards", "true", "turn",          "view",         "wi",     "wo"};
+  static const std::set<std::string> names = {"across", "along", "at",   "away",  "axis",  "normal",
+                                              "place",  "ray",   "row",  "scale", "shape", "towards",
+                                              "true",   "turn",  "view", "wi",    "wo"};
   return names;
 }
 
@@ -86,31 +86,22 @@ NodeProgram record_cone() {
     p.output("of_cones", cone.of_cones);
     p.output("solid_angle", cone.solid_angle);
     p.output("chord", cone.chord);
-    p.output("chord_of_others", cone.chord_of_others);
     p.output("reach", cone.reach);
     p.output("flat", cone.flat);
     p.output("used", cone.used);
     p.output("active", cone.active);
     p.output("above", cone.above);
-    p.output("share", cone.share);
-    p.output("share_of_others", cone.share_of_others);
     p.output("count", cone.cones.count);
     p.output("sine", cone.cones.sine);
-    p.output("sine_of_others", cone.cones.sine_of_others);
-    p.output("in_row", cone.cones.in_row);
     p.output("row", cone.cones.row);
-    p.output("corner_across", cone.cones.across);
-    p.output("corner_along", cone.cones.along);
   });
 }
 NodeProgram record_cone_at() {
   return recorded([](Program& p) {
     LampCone<Expr> cone;
     cone.towards = input3("towards");
-    cone.cones = {Expr::input("count"), Expr::input("sine"),     Expr::input("sine_of_others"), Expr::input("in_row"),
-                  input3("row"),        input3("corner_across"), input3("corner_along")};
-    const ConeAt<Expr> one = cone_at(slot_input(), cone, input3("at"), Expr::input("index"), Expr::input("x"),
-                                     Expr::input("y"), input3("normal"));
+    cone.cones = {Expr::input("count"), Expr::input("sine"), input3("row")};
+    const ConeAt<Expr> one = cone_at(slot_input(), cone, input3("at"), Expr::input("index"), input3("normal"));
     p.output("axis", one.towards);
     p.output("clear", one.clear);
   });
@@ -136,17 +127,15 @@ NodeProgram record_lobe() {
   return recorded([](Program& p) {
     LampCone<Expr> cone;
     cone.chord = Expr::input("chord");
-    cone.chord_of_others = Expr::input("chord_of_others");
     cone.flat = Expr::input("flat");
     cone.solid_angle = Expr::input("solid_angle");
     cone.clear = Expr::input("clear");
+    cone.cones.count = Expr::input("count");
     const Expr emphasis = select(cone.flat > Expr(0.5), Expr::input("emphasis"), Expr(1.0));
-    const ToonLobes<Expr> lobes = toon_lobes(cone, emphasis, Expr::input("density"), Expr::input("room"),
-                                             Rgb<Expr>::input("value"), Expr::input("u_2"));
-    p.output("color", lobes.first.color);
-    p.output("size", lobes.first.size);
-    p.output("color_of_others", lobes.others.color);
-    p.output("size_of_others", lobes.others.size);
+    const ToonLobe<Expr> lobe = toon_lobe(cone, emphasis, Expr::input("density"), Expr::input("room"),
+                                          Rgb<Expr>::input("value"), Expr::input("u_2"));
+    p.output("color", lobe.color);
+    p.output("size", lobe.size);
   });
 }
 NodeProgram record_rest() {

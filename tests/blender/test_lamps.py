@@ -177,9 +177,9 @@ def test_every_type_of_lamp(ball, empty, subtests):
 
 
 def test_cones_of_rectangles(extension, ball, empty, monkeypatch):
-    """A rectangle may have five, or as many as a material's closures have room for."""
+    """A rectangle may have four, or as many as a material's closures have room for."""
     lamp = add_lamp(empty, "AREA", shape="RECTANGLE", size=1.0, size_y=0.1)
-    assert codes(empty) == [(5, 0)]
+    assert codes(empty) == [(4, 0)]
     (slot,) = slots(empty)
     assert_lamp(slot, lamp)
     lamp.data.shape = "ELLIPSE"
@@ -188,9 +188,9 @@ def test_cones_of_rectangles(extension, ball, empty, monkeypatch):
     faint = add_lamp(empty, "AREA", "Faint", (5, 0, 9), shape="RECTANGLE", size=1.0, size_y=0.1)
     faint.data.energy = 0.01
     filling = import_module(f"{extension.package}.lamps.filling")
-    monkeypatch.setattr(filling, "_room", lambda _: (6, None))
+    monkeypatch.setattr(filling, "_room", lambda _: (5, None))
     extension.api.see_lamps(empty)
-    assert sorted(codes(empty)) == [(1, 0), (5, 0)]
+    assert sorted(codes(empty)) == [(1, 0), (4, 0)]
     # Shaders of another version would take these numbers for other kinds of lamps.
     update = import_module(f"{extension.package}.groups.update")
     monkeypatch.setattr(update, "others", lambda: [(None, None)])
