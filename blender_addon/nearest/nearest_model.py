@@ -148,6 +148,7 @@ _COLORED = (
 )
 _MATTE = (
     Candidate("lambert", lambda n: {"rho": n.color}, None, {"rho": "Color"}),
+    Candidate("eon", lambda n: {"rho": n.color}, Width("r", 1e-3, 1.0, 1), {"rho": "Color"}),
     *(
         Candidate(
             "oren_nayar",

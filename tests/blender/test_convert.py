@@ -120,11 +120,11 @@ def test_what_is_a_model_already_is_off_by_nothing(extension, convert):
 @pytest.mark.parametrize(
     ("kind", "inputs", "models", "worst"),
     [
-        ("diffuse", {"Roughness": 0.5}, {"oren_nayar"}, 0.08),
+        ("diffuse", {"Roughness": 0.5}, {"eon"}, 0.02),
         ("glossy", {"Roughness": 0.3}, {"microfacet"}, 0.05),
         ("glossy", {"Roughness": 0.0, "Color": (0.5, 0.5, 0.5)}, {"lambertian_specular"}, 1e-6),
         ("principled", {"Roughness": 0.4}, {"microfacet"}, 0.01),
-        ("principled", {"Roughness": 0.4, "Diffuse_Roughness": 0.5}, {"microfacet"}, 0.07),
+        ("principled", {"Roughness": 0.4, "Diffuse_Roughness": 0.5}, {"microfacet"}, 0.03),
         ("principled", {"Roughness": 0.0}, {"coupled"}, 0.1),
         ("principled", {"Roughness": 0.4, "IOR": 1.0}, {"lambert"}, 1e-6),
         # Coloured mirrors.
