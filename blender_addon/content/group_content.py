@@ -10,7 +10,7 @@ from .. import lamps
 from ..common.i18n import say
 from ..packs import pack
 from ..packs.pack import choice_label
-from . import compiler, formula_nodes, stand_in, twin
+from . import compiler, formula_nodes, part_groups, stand_in, twin
 from .compiler import CompileError
 from .group_sockets import VECTORS, Interface, has_menus
 from .wiring import Wiring
@@ -129,6 +129,15 @@ def outputs_of(model_name, representation, albedo):
         return [name for name in OUTPUTS if name != ALBEDO]
     apart = has_albedo_script(model_name, representation)
     return [name for name in OUTPUTS if albedo or not apart or name != ALBEDO]
+
+
+def bent_normal_group(model_name):
+    """The group that bends a normal as Cycles' glossy nodes bend theirs; None if the pack has no
+    Formula Nodes of this model, whose part it is."""
+    if "nodes" not in pack.model(model_name)["representations"]:
+        return None
+    _, source = pack.source(model_name, "nodes")
+    return part_groups.bent_normal_group(json.loads(source)["parts"]["bend"])
 
 
 def fill_with_nodes(group, model_name, representation, source, twin_group):

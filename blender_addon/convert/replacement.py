@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import bpy
 
+from ..content import group_content
 from ..groups import bump_correction, nodes
 from ..packs import pack
 from ..trees import animation, shader_trees, shader_values
@@ -173,6 +174,12 @@ class Replacement:
         view = self._helper("ShaderNodeLayerWeight")
         view.inputs["Blend"].default_value = 0.5
         if source := self._source("Normal"):
+            # Where the normal faces away from the viewer, Cycles bends it back.
+            if group := group_content.bent_normal_group(self._plan.model):
+                bent = self._helper("ShaderNodeGroup")
+                bent.node_tree = group
+                self._tree.links.new(source, bent.inputs["Normal"])
+                source = bent.outputs["Normal"]
             self._tree.links.new(source, view.inputs["Normal"])
         rest = self._plan.rest
         roughness = self._roughness() if len(rest[0]) > 1 else None

@@ -44,8 +44,15 @@ class Native:
 
     @property
     def alpha(self):
+        """Along and across the tangent. Cycles clamps both."""
         width = self.roughness**2
-        return width * self.stretch**0.5, width / self.stretch**0.5
+        return min(width * self.stretch**0.5, 1.0), min(width / self.stretch**0.5, 1.0)
+
+    @property
+    def mean_alpha(self):
+        """The equal roughnesses by which Cycles looks up albedos."""
+        mean = (self.alpha[0] * self.alpha[1]) ** 0.5
+        return mean, mean
 
     @property
     def is_mirror(self):
@@ -193,7 +200,7 @@ def again(native):
     """The interreflection() of a node with Multiscatter GGX, as a colour."""
     slope, offset = facet_law(native)
     average = slope * _clamp_to_one(native.color) + offset
-    found = interreflection(average, mean_facet_albedo(native.alpha))
+    found = interreflection(average, mean_facet_albedo(native.mean_alpha))
     return tuple(float(c) for c in np.clip(found, 0, 1))
 
 
@@ -202,8 +209,8 @@ def _multiscatter(wo, native, average):
     if not native.multiscatter or native.beckmann:
         return np.ones((len(wo), 3))
     average = np.broadcast_to(average, 3)
-    seen = facet_albedo(wo, native.alpha, False)[:, None]
-    return multiple_scattering_factor(average, mean_facet_albedo(native.alpha), seen)
+    seen = facet_albedo(wo, native.mean_alpha, False)[:, None]
+    return multiple_scattering_factor(average, mean_facet_albedo(native.mean_alpha), seen)
 
 
 def _oren_nayar_G(cosine):
@@ -257,13 +264,13 @@ def view_terms(native, each):
         return none._replace(metal=_multiscatter(each, native, color))
     terms = none
     if native.metallic < 1:
-        taken = facet_albedo(each, native.alpha, False, lambda c: dielectric(native.f0, c))
+        taken = facet_albedo(each, native.mean_alpha, False, lambda c: dielectric(native.f0, c))
         if native.multiscatter:
             gloss = _multiscatter(each, native, mean_dielectric(native.f0))[:, 0]
             terms = terms._replace(taken=taken * gloss, gloss=gloss)
         else:
             # Cycles keeps from the base what facets would reflect if they hid no light.
-            whole = facet_albedo(each, native.alpha, False)
+            whole = facet_albedo(each, native.mean_alpha, False)
             terms = terms._replace(taken=taken / whole)
     if native.metallic > 0:
         terms = terms._replace(metal=_multiscatter(each, native, mean_metal_fresnel(native)))

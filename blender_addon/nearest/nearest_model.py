@@ -58,6 +58,8 @@ class Candidate:
     #: The Fit of the matte base beneath this glossy layer, which has the light that the layer's
     #: albedo leaves.
     base: "Fit | None" = None
+    #: Whether parameters that no link sets depend on the node's colour.
+    of_color: bool = False
 
     @property
     def is_colored(self):
@@ -146,6 +148,19 @@ _COLORED = (
         "modified_phong", lambda n: {"ks": n.color}, Width("e", **_EXPONENT), {"ks": "Color"}
     ),
 )
+#: A Glossy node reflects the same at every angle. At 82 degrees, where `tint` counts most, so does
+#: this.
+_FLAT = Candidate(
+    "microfacet",
+    lambda n: {
+        "f0": n.color,
+        "tint": tuple(c / (c + (1 - c) * (6 / 7) ** 5) for c in n.color),
+        **_distribution(n),
+    },
+    _FACETS,
+    {"f0": "Color"},
+    of_color=True,
+)
 _MATTE = (
     Candidate("lambert", lambda n: {"rho": n.color}, None, {"rho": "Color"}),
     Candidate("eon", lambda n: {"rho": n.color}, Width("r", 1e-3, 1.0, 1), {"rho": "Color"}),
@@ -223,7 +238,7 @@ def _candidates(native, has):
             return (_METAL_MIRROR, _TINTED_MIRROR)
         return (_METAL_MIRROR,) if native.metallic == 1 else _polished({}, sharp=True)
     if native.kind == "glossy":
-        return _COLORED
+        return (*_COLORED, _FLAT)
     if native.metallic == 1:
         return (*_COLORED, *_polished({"rs": "Color"}))
     if native.metallic == 0:
@@ -410,6 +425,8 @@ def nearest(natives, colors, colored, has):
         if any(n.stretch != 1 for n in natives) and not (
             candidate.width and candidate.width.across
         ):
+            continue
+        if colored and candidate.of_color:
             continue
         lost = colored and not candidate.is_colored
         key = candidate.model, candidate.width

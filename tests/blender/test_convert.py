@@ -185,11 +185,15 @@ def test_plastic_is_near_without_osl(convert, empty, roughness, ior):
 
 @pytest.mark.parametrize("osl", [False, True])
 @pytest.mark.parametrize("roughness", [0.3, "linked"])
-def test_a_picture_of_plastic_is_as_before(extension, convert, empty, roughness, osl):
-    """In a white world, with a bent normal, and back again."""
+@pytest.mark.parametrize("normal", [(0.3, -0.8, 0.5), (0.9, 0.1, 0.4)], ids=["bent", "away"])
+def test_a_picture_of_plastic_is_as_before(extension, convert, empty, normal, roughness, osl):
+    """In a white world, with a bent normal, also one that faces away from the viewer, which Cycles
+    bends back, and back again."""
+    if normal[1] > 0 and bpy.app.version >= (5, 0):
+        pytest.skip("Blender 5 reflects up to 0.01 more than microfacets about such a normal")
     material, node = material_of("principled", "GGX", Base_Color=(0.5, 0.3, 0.1), Roughness=0.3)
     bent = linked(material, node, "Normal", "ShaderNodeCombineXYZ")
-    for i, value in enumerate((0.3, -0.8, 0.5)):
+    for i, value in enumerate(normal):
         bent.inputs[i].default_value = value
     if roughness == "linked":
         picture = picture_node(material.node_tree, (0.2, 0.2, 0.2), (0.9, 0.9, 0.9))
@@ -204,11 +208,38 @@ def test_a_picture_of_plastic_is_as_before(extension, convert, empty, roughness,
     assert convert.apply([plan]) == 1
     after = flat(empty, material)
     print(f"{before} and {after}")
+    # Bent back, the normal is at 45 degrees, where the polynomial in two numbers is less exact.
+    worst = 0.05 if normal[1] > 0 and roughness == "linked" else 0.02
     for x, y in zip(before, after, strict=True):
-        assert y == pytest.approx(x, rel=0.02)
+        assert y == pytest.approx(x, rel=worst)
     assert convert.restore(material) == 1
     assert {n.name for n in material.node_tree.nodes} == names
     assert np.array(flat(empty, material)) == pytest.approx(np.array(before), rel=1e-3)
+
+
+@pytest.mark.parametrize(("roughness", "anisotropic"), [(0.4, 0.8), (0.6, 0.8), (0.8, 1.0)])
+def test_an_anisotropic_metal_is_the_microfacet_model(convert, roughness, anisotropic):
+    """Also where Cycles clamps the width across or along the tangent to 1."""
+    metal = {"Base_Color": GOLD, "Metallic": 1.0, "Anisotropic": anisotropic}
+    material, _ = material_of("principled", "MULTI_GGX", Roughness=roughness, **metal)
+    plan = only(convert.plan([material]))
+    aspect = (1 - 0.9 * anisotropic) ** 0.5
+    wide, narrow = min(roughness**2 / aspect, 1), roughness**2 * aspect
+    print(plan.line(), plan.values)
+    assert plan.model == "microfacet" and plan.error < 2e-3
+    assert plan.values["ax"] == pytest.approx(wide, rel=0.01)
+    assert plan.values["ay"] == pytest.approx(narrow, rel=0.01)
+
+
+@pytest.mark.parametrize("distribution", ["GGX", "MULTI_GGX", "BECKMANN"])
+@pytest.mark.parametrize("anisotropy", [0.0, 0.8])
+def test_a_glossy_node_has_no_fresnel_term(convert, distribution, anisotropy):
+    """The Edge Tint of the model makes it flat up to grazing angles."""
+    glossy = {"Color": (0.5, 0.3, 0.2), "Roughness": 0.8, "Anisotropy": anisotropy}
+    plan = only(convert.plan([material_of("glossy", distribution, **glossy)[0]]))
+    print(plan.line(), plan.values)
+    assert plan.model == "microfacet" and plan.error < 0.02
+    assert plan.values["tint"][2] < 0.4
 
 
 @pytest.mark.parametrize("roughness", [0.2, 0.5, 1.0])
