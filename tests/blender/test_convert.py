@@ -464,7 +464,8 @@ def test_links_stay(extension, convert):
     gloss, base = (extension.nodes.sockets(g) for g in extension.nodes.group_nodes(material))
     assert base["rho"].links[0].from_node == colour
     view = next(n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeLayerWeight")
-    for socket in (gloss["Normal"], base["Normal"], view.inputs["Normal"]):
+    bend = view.inputs["Normal"].links[0].from_node
+    for socket in (gloss["Normal"], base["Normal"], bend.inputs["Normal"]):
         assert socket.links[0].from_node == bump
     output = next(n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
     assert output.inputs["Surface"].links[0].from_node.bl_idname == "ShaderNodeAddShader"
@@ -547,8 +548,8 @@ def test_a_strip_still_moves_a_parameter_in_another_form(extension, convert, emp
 def test_a_limit_is_a_reason(extension, convert):
     material, node = material_of("glossy", "MULTI_GGX", Roughness=0.5)
     (plan,) = extension.api.plan_conversion([material])
-    assert not plan.refusal and 0.005 < plan.error < 0.35
-    (plan,) = extension.api.plan_conversion([material], limit=0.005)
+    assert not plan.refusal and 0.004 < plan.error < 0.35
+    (plan,) = extension.api.plan_conversion([material], limit=0.004)
     assert plan.line() == (
         f"{material.name}, Glossy BSDF: stays, its nearest model, Microfacet, sends "
         f"{100 * plan.error:.2g} % of the light in other directions"

@@ -121,7 +121,7 @@ METAL = {"Metallic": 1.0, "Roughness": 0.5}
 FORMS = [
     *(
         ("diffuse", "Color", {"Roughness": 0.5}, form)
-        for form in ("nodes", "aimed", "sampled", "fitted", "twin")
+        for form in ("nodes", "exact", "sampled", "fitted", "twin")
     ),
     *(("principled", "Base Color", METAL, form) for form in ("nodes", "aimed", "sampled")),
 ]
