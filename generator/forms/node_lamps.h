@@ -3,7 +3,7 @@
 // drops closures that subtract light. So the light that a closure carries for a lamp can't be subtracted elsewhere and
 // has to be left out there.
 //
-// Lamps: one Toon closure each, constant over the lamp's cone, with a part of the model's f cos at a random point of
+// Lamps: Toon closures, constant over the lamp's cone or cones, with a part of the model's f cos at a random point of
 // the lamp. Rest: a direction drawn from the model. If it hits one of these lamps, it carries the other part of f cos.
 //
 // The two parts are those of multiple importance sampling (Veach and Guibas 1995, power heuristic with exponent 2). So
@@ -67,7 +67,7 @@ template <class T> struct LampCones {
 /// point C + tA of the lamp it is (1 - t) times that, with |C + tA| in place of |C|.
 template <class T, class Bool> LampCones<T> cones_of_rectangle(const LampSlot<T>& slot, const LampAxes<T>& lamp,
                                                                const Vec3<T>& centre, const Bool& many) {
-  // From this ratio of the sides on, two overlapping cones have less variance than one.
+  // Of a rectangle that looks shorter than this, for its width, two cones cover hardly more than one.
   constexpr double kTwo = 1.1;
   const Vec3<T> a = lamp.across * lamp.half_across, b = lamp.along * lamp.half_along;
   const T a2 = sqr(lamp.half_across), b2 = sqr(lamp.half_along), c2 = dot(centre, centre);
