@@ -33,8 +33,7 @@ class _Surface:
         own = w.scaled(geometry.outputs["Normal"], missing)
         self.normal = w.vector("NORMALIZE", w.vector("ADD", normal, own))
         if parts.has("bend"):
-            vectors = {"true": self.true_normal, "view": self.view, "normal": self.normal}
-            self.normal = parts.add("bend", strand=self.strand, **vectors)["normal"]
+            self.normal = _bent(parts, geometry, self.strand, self.normal)
         self.drawn = _random(w, self, 0.0)
         self.anywhere = _direction(w, *_random(w, self, 1.0)[:2])
         if tangent is None:
@@ -81,6 +80,26 @@ class _Surface:
             scaled = w.scaled(axis, part)
             total = scaled if total is None else w.vector("ADD", total, scaled)
         return total
+
+
+def _bent(parts, geometry, strand, normal):
+    """A normal, bent as Cycles' glossy nodes bend theirs."""
+    true, view = geometry.outputs["True Normal"], geometry.outputs["Incoming"]
+    return parts.add("bend", strand=strand, true=true, view=view, normal=normal)["normal"]
+
+
+def bent_normal_group(data):
+    """The group that bends a normal as Cycles' glossy nodes bend theirs. `data`: contents of
+    nodes/*.json."""
+    part, sockets = data["parts"]["bend"], [["Normal", "VECTOR"]]
+
+    def fill(w, found):
+        parts = Parts(w, {"bend": part}, "bent normal", {})
+        geometry = w.node("ShaderNodeNewGeometry")
+        strand = w.node("ShaderNodeHairInfo").outputs["Is Strand"]
+        return {"Normal": _bent(parts, geometry, strand, found["Normal"])}
+
+    return make_group("bent normal", ["bent normal", part], sockets, sockets, fill)
 
 
 def _local(w, vector, axes):

@@ -10,7 +10,7 @@ from .. import lamps
 from ..common.i18n import say
 from ..packs import pack
 from ..packs.pack import choice_label
-from . import compiler, formula_nodes, part_groups, stand_in, twin
+from . import compiler, formula_nodes, stand_in, twin
 from .compiler import CompileError
 from .group_sockets import VECTORS, Interface, has_menus
 from .wiring import Wiring
@@ -137,7 +137,7 @@ def bent_normal_group(model_name):
     if "nodes" not in pack.model(model_name)["representations"]:
         return None
     _, source = pack.source(model_name, "nodes")
-    return part_groups.bent_normal_group(json.loads(source)["parts"]["bend"])
+    return formula_nodes.bent_normal_group(json.loads(source))
 
 
 def fill_with_nodes(group, model_name, representation, source, twin_group):

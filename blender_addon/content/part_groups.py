@@ -205,25 +205,6 @@ class Parts:
         return Parts(wiring, self.data, self.title, constants)
 
 
-def bent_normal_group(data):
-    """The group that bends a normal as Cycles' glossy nodes bend theirs. `data`: the part `bend` of
-    a model."""
-    sockets = [["Normal", "VECTOR"]]
-
-    def fill(w, found):
-        geometry = w.node("ShaderNodeNewGeometry")
-        inputs = {
-            "true": geometry.outputs["True Normal"],
-            "view": geometry.outputs["Incoming"],
-            "normal": found["Normal"],
-            "strand": w.node("ShaderNodeHairInfo").outputs["Is Strand"],
-        }
-        made = add_group(w, _part_group("bend", data), inputs, "bend")
-        return {"Normal": made["normal"]}
-
-    return make_group("bent normal", ["bent normal", data], sockets, sockets, fill)
-
-
 def _unused():
     for group in bpy.data.node_groups:
         if group.library is None and PART in group and group.users == 0:

@@ -446,14 +446,6 @@ def _trees(tree, seen):
             _trees(node.node_tree, seen)
 
 
-def trees_within(node):
-    """The trees inside a group node, nested groups included; none for groups of this extension."""
-    trees = []
-    if not is_ours(node):
-        _trees(getattr(node, "node_tree", None), trees)
-    return trees
-
-
 def all_trees(owner):
     """The node tree of a material or world, and those of the groups in it, nested groups included;
     none of this extension."""

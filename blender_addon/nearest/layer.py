@@ -65,7 +65,8 @@ def schlick_like(f0):
     wanted = native_bsdf.dielectric(f0, c)
     f0s = (f0 * np.linspace(1, 1.3, 31))[:, None, None]
     tints = np.linspace(0.7, 1, 31)[:, None]
-    strongest = c * (1 - c) ** 6 / (1 / 7 * (6 / 7) ** 6)
+    tinted = native_bsdf.TINTED
+    strongest = c * (1 - c) ** 6 / (tinted * (1 - tinted) ** 6)
     found = (f0s + (1 - f0s) * (1 - c) ** 5) * (1 - (1 - tints) * strongest)
     off = np.abs(found / wanted - 1).mean(-1)
     i, j = np.unravel_index(np.argmin(off), off.shape)

@@ -17,6 +17,8 @@ _MU = (_MU + 1) / 2
 _SHARE = _SHARE * _MU
 
 
+#: Cosine of 82 degrees, where an edge tint counts most.
+TINTED = 1 / 7
 #: A node with a smaller roughness is an ideal mirror.
 SMOOTH = 1e-3
 
@@ -92,8 +94,15 @@ def mean_schlick(color):
 
 def _edge_loss(native):
     """The factor of cos (1 - cos)^6 that a metal's Specular Tint takes from schlick()."""
-    strongest = 1 / 7 * (6 / 7) ** 6
-    return (1 - _clamp_to_one(native.tint)) * schlick(native.color, np.array(1 / 7)) / strongest
+    strongest = TINTED * (1 - TINTED) ** 6
+    return (1 - _clamp_to_one(native.tint)) * schlick(native.color, np.array(TINTED)) / strongest
+
+
+def flat_tint(color):
+    """The edge tint with which `microfacet` reflects the same at 82 degrees as at normal
+    incidence."""
+    found = _clamp_to_one(color) / schlick(color, np.array(TINTED))
+    return tuple(float(c) for c in found)
 
 
 def metal_fresnel(native, cosine):

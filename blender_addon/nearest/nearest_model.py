@@ -154,7 +154,7 @@ _FLAT = Candidate(
     "microfacet",
     lambda n: {
         "f0": n.color,
-        "tint": tuple(c / (c + (1 - c) * (6 / 7) ** 5) for c in n.color),
+        "tint": native_bsdf.flat_tint(n.color),
         **_distribution(n),
     },
     _FACETS,

@@ -18,7 +18,7 @@ print::NodeProgram record_bend();
 print::NodeProgram record_raise();
 print::NodeProgram record_axes();
 print::NodeProgram record_cone();
-/// The part of a rectangle with this index.
+/// The cone of a lamp with this index.
 print::NodeProgram record_cone_at();
 print::NodeProgram record_flat();
 print::NodeProgram record_met();
