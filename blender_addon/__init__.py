@@ -10,7 +10,7 @@ from . import lamps, operators
 from .common import i18n
 from .groups import automatic, imports, update
 from .panels import plot_panel, ui
-from .warnings import checks, console
+from .warnings import closure_slots, console
 
 
 def _refuse_beside_another():
@@ -27,7 +27,7 @@ def _refuse_beside_another():
 def register():
     _refuse_beside_another()
     i18n.register()
-    lamps.ask(checks.lamps_that_fit, lambda: not update.others())
+    lamps.ask(closure_slots.lamps_that_fit, lambda: not update.others())
     operators.register()
     ui.register()
     plot_panel.register()

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import bpy
 
-from ..packs import device
 from . import kinds, scenes, shared_group, slots
 from .survey import Survey
 
@@ -36,7 +35,7 @@ def _arranged(chosen, before):
     return sorted(arranged[: len(chosen)], key=lambda c: -c.width)
 
 
-def _no_limit(scene):
+def _no_limit():
     return None
 
 
@@ -49,27 +48,22 @@ _room, _are_codes_read = _no_limit, _always
 
 def ask(lamps_that_fit, are_codes_read):
     """Sets two functions that look into groups, which are made of this package. lamps_that_fit()
-    counts how many lamps the open file's materials can aim at on a scene's device: given the scene,
-    it returns a tuple that begins with the number, or None. are_codes_read(): whether all materials
-    of the open file read slots.coded(), which those of older versions don't."""
+    counts how many lamps the open file's materials can aim at: it returns a tuple that begins with
+    the number, or None. are_codes_read(): whether all materials of the open file read
+    slots.coded(), which those of older versions don't."""
     global _room, _are_codes_read
     _room, _are_codes_read = lamps_that_fit, are_codes_read
 
 
-def _most(scene):
-    """How many lamps there is room for in the open file's materials on a scene's device."""
-    found = _room(scene)
+def _most():
+    """How many lamps there is room for in the open file's materials."""
+    found = _room()
     return slots.SLOTS * slots.MOST_CONES if found is None else found[0]
 
 
-def limit_of(scene):
-    """How many lamps materials can aim at on a scene's device."""
-    return min(_most(scene), slots.SLOTS)
-
-
-def device_changed(scene):
-    """Whether the scene's device has since changed to or from one that limits lamps."""
-    return device.runs_on_optix(scene) != memory.on_optix
+def most_lamps():
+    """How many lamps materials can aim at."""
+    return min(_most(), slots.SLOTS)
 
 
 def _cones(chosen, most):
@@ -134,9 +128,7 @@ def _listed(survey, chosen, why=None):
 
 #: Result of the last survey and the session_uid of its scene; busy: whether the group is being
 #: filled.
-memory = SimpleNamespace(
-    scene=None, survey=Survey(), lamps=[], limit=slots.SLOTS, on_optix=False, busy=False
-)
+memory = SimpleNamespace(scene=None, survey=Survey(), lamps=[], limit=slots.SLOTS, busy=False)
 
 
 def _survey(scene, depsgraph, subject=None):
@@ -156,7 +148,7 @@ def _fill(scene, depsgraph, subject=None, keep=True):
     """Updates the shared group, if there is one; returns [slots.Lamp]. `keep`: lamps keep their
     slots where possible."""
     survey = _survey(scene, depsgraph, subject)
-    most = _most(scene)
+    most = _most()
     limit = min(most, slots.SLOTS)
     group = shared_group.deduplicate()
     now = shared_group.written(group) if group else []
@@ -174,7 +166,7 @@ def _fill(scene, depsgraph, subject=None, keep=True):
                 shared_group.write(socket, new)
     lamps = _listed(survey, chosen)
     memory.scene, memory.survey = scene.session_uid, survey
-    memory.lamps, memory.limit, memory.on_optix = lamps, limit, device.runs_on_optix(scene)
+    memory.lamps, memory.limit = lamps, limit
     return lamps
 
 
@@ -241,7 +233,7 @@ def last_found(scene, group=None):
     survey = memory.survey if surveyed else _survey(scene, scene.view_layers[0].depsgraph)
     worth = _worth_aiming(survey)
     if group is None:
-        return _listed(survey, _arranged(worth[: limit_of(scene)], []))
+        return _listed(survey, _arranged(worth[: most_lamps()], []))
     there = [slots.decoded(numbers) for numbers in _by_slot(shared_group.written(group))]
     chosen = [c for c in worth if any(shared_group.all_same(c.values, slot) for slot in there)]
     return _listed(survey, chosen, slots.elsewhere(group.library))

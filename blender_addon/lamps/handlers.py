@@ -36,13 +36,13 @@ def _concerns(update, scene):
     )
 
 
-def _is_limited_anew(updates, scene):
+def _is_limited_anew(updates):
     """Whether the number of lamps that materials can aim at may have changed. Counting takes time,
-    so this looks only at changes of the device, a material or a setting."""
+    so this looks only at changes of a material or a setting."""
     types = bpy.types.Scene | bpy.types.Material | bpy.types.NodeTree
-    if not filling.device_changed(scene) and not any(isinstance(u.id, types) for u in updates):
+    if not any(isinstance(u.id, types) for u in updates):
         return False
-    return filling.limit_of(scene) != filling.memory.limit
+    return filling.most_lamps() != filling.memory.limit
 
 
 @persistent
@@ -59,7 +59,7 @@ def _after_update(scene, depsgraph):
         filling.quietly(scene, depsgraph)
         return
     updates = list(depsgraph.updates)
-    limited = _is_limited_anew(updates, scene)
+    limited = _is_limited_anew(updates)
     if not limited and not any(_concerns(update, scene) for update in updates):
         return
     structural = any(isinstance(u.id, bpy.types.Scene | bpy.types.Collection) for u in updates)

@@ -5,7 +5,8 @@ import bpy
 
 from . import pack
 
-#: Devices other than the CPU that can run OSL.
+#: The devices other than the CPU on which Blender can run OSL. Shaders of this extension are
+#: untested there, so materials use Formula Nodes as on other GPUs.
 OSL_DEVICES = {"OPTIX"}
 
 
@@ -15,12 +16,10 @@ def gpu_backend():
     return addon.preferences.compute_device_type if addon else "NONE"
 
 
-def without_osl(scene):
-    """Name of the compute device if the scene renders on one that can't run OSL, else None."""
+def gpu(scene):
+    """The compute device type if Cycles renders a scene on a GPU, else None."""
     backend = gpu_backend()
-    if scene.cycles.device != "GPU" or backend == "NONE" or backend in OSL_DEVICES:
-        return None
-    return backend
+    return backend if scene.cycles.device == "GPU" and backend != "NONE" else None
 
 
 def of_elsewhere(scene):
@@ -29,21 +28,14 @@ def of_elsewhere(scene):
     return scene.cycles.device == "GPU" and gpu_backend() == "NONE"
 
 
-def runs_on_optix(scene):
-    """Whether a scene's shaders run on a GPU, where the memory for closures is limited."""
-    cycles = scene.cycles
-    on_gpu = scene.render.engine == "CYCLES" and cycles.device == "GPU"
-    return on_gpu and cycles.shading_system and gpu_backend() in OSL_DEVICES
-
-
 def lacks_osl(scene):
-    """Whether Cycles renders a scene without Open Shading Language. A Blender that was built
-    without OSL lacks it under every engine."""
+    """Whether Cycles renders a scene without Open Shading Language, or on a GPU. A Blender that
+    was built without OSL lacks it under every engine."""
     if not pack.osl_available():
         return True
     if scene is None or scene.render.engine != "CYCLES":
         return False
-    return not scene.cycles.shading_system or without_osl(scene) is not None
+    return not scene.cycles.shading_system or gpu(scene) is not None
 
 
 def is_eevee(scene):

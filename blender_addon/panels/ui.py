@@ -12,9 +12,9 @@ from ..common import color, editable
 from ..common.i18n import form_name, iface, in_percent, of_error, say
 from ..content import group_content
 from ..groups import nodes
-from ..packs import device, energy, kernel, optical, pack
+from ..packs import energy, kernel, optical, pack
 from ..trees import shader_trees
-from ..warnings import checks
+from ..warnings import checks, closure_slots
 from ..warnings.table import BUTTONS, MAKE_LOCAL, UNABLE
 from .labels import wrapped
 from .methods import METHODS
@@ -189,8 +189,7 @@ def _draw_form(layout, node, form, scene, changes):
     if pack.native_form(model_name):
         _add_method(row, node, "auto", automatic)
     for name in entry["representations"]:
-        refusal = pack.reason_unavailable(model_name, name, values)
-        if refusal := refusal or checks.device_refusal(model_name, name, scene):
+        if refusal := pack.reason_unavailable(model_name, name, values):
             refusals.append(refusal)
             continue
         _add_method(row, node, name, name == representation and not lean and not automatic)
@@ -263,21 +262,14 @@ def draw_lamps(layout, material, scene):
     else:
         said = say("Free of noise under no lamp yet")
     wrapped(box.column(align=True), said, "LIGHT")
-    limit = checks.lamps_that_fit(scene)
+    limit = closure_slots.lamps_that_fit()
     if limit is not None and limit[0] < slots:
         room, largest = limit
-        if device.runs_on_optix(scene):
-            said = say(
-                "OptiX has memory for {count} lamps beside this file's models; all that a Mix "
-                "Shader mixes shares it",
-                count=room,
-            )
-        else:
-            said = say(
-                "Cycles has room for {count} lamps beside the shaders of {material}",
-                count=room,
-                material=largest.name,
-            )
+        said = say(
+            "Cycles has room for {count} lamps beside the shaders of {material}",
+            count=room,
+            material=largest.name,
+        )
         wrapped(box.column(align=True), said, "ERROR")
     box.operator("brdfc.find_lamps", icon="FILE_REFRESH")
 

@@ -3,33 +3,13 @@
 
 import bpy
 
-from ..common import i18n
 from ..common.i18n import Sentence, in_percent, say
 from ..groups import nodes
 from ..packs import device, pack
-from . import closure_pool
 from .context import MaterialContext, NodeContext, SceneContext, twin_of
 from .rows import WARNING, Finding
 from .scene_rules import engine_name
 from .table import DECLARED, OF_MATERIAL, OF_NODE, OF_SCENE, UNABLE
-
-
-def lamps_that_fit(scene):
-    """How many lamps the materials of the open file can aim at on a scene's device, and the
-    material that sets this limit; None where no material aims at lamps."""
-    return closure_pool.lamps_that_fit(device.runs_on_optix(scene))
-
-
-def device_refusal(model_name, form, scene):
-    """Why a form of a model can't run on a scene's device; None if it can."""
-    size, room = pack.representation(model_name, form)["closure_bytes"], closure_pool.capacity()
-    if size > room and device.runs_on_optix(scene):
-        return say(
-            "{form} takes more memory than OptiX has: it is for the CPU",
-            more=f"{size} bytes of closures, and there is room for {room}",
-            form=i18n.form_name(form),
-        )
-    return None
 
 
 def _found(rows, at):
@@ -112,7 +92,7 @@ def enable_osl(scene):
     if scene.render.engine != "CYCLES":
         done.append(say("Render engine changed from {engine} to Cycles", engine=engine_name(scene)))
         scene.render.engine = "CYCLES"
-    backend = device.without_osl(scene)
+    backend = device.gpu(scene)
     if backend or device.of_elsewhere(scene):
         backend = backend or Sentence("GPU Compute")
         done.append(say("Device changed from {backend} to the CPU", backend=backend))

@@ -11,7 +11,7 @@ from ..common.i18n import say
 from ..groups import nodes, update
 from ..lamps import emission
 from ..packs import device, pack
-from . import closure_pool
+from . import closure_slots
 
 #: Nodes of a world with a uniform colour.
 _PLAIN_WORLD = {"ShaderNodeBackground", "ShaderNodeOutputWorld"}
@@ -87,12 +87,8 @@ class MaterialContext:
 
     @cached_property
     def use(self):
-        """What its shaders take of Cycles' memory for closures."""
-        return closure_pool.of_material(self.material)
-
-    @cached_property
-    def on_optix(self):
-        return device.runs_on_optix(self.scene)
+        """The closure slots that its shaders take."""
+        return closure_slots.of_material(self.material)
 
 
 class NodeContext:

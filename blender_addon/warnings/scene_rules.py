@@ -9,8 +9,6 @@ from ..trees import shader_trees
 from .rows import when
 
 BLENDER_MIN = (4, 5, 0)
-#: Description of the recorded run of these shaders on an OptiX device; None if there is none.
-OPTIX_RUN = None
 
 
 def engine_name(scene):
@@ -67,8 +65,8 @@ def black_aovs(at):
 
 def unable_device(at):
     """The scene renders on a GPU through CUDA, HIP, Metal or oneAPI."""
-    backend = at.offers_osl and device.without_osl(at.scene)
-    return when(backend, backend=backend)
+    backend = device.gpu(at.scene) if at.offers_osl else None
+    return when(backend and backend not in device.OSL_DEVICES, backend=backend)
 
 
 def device_of_another_computer(at):
@@ -78,5 +76,7 @@ def device_of_another_computer(at):
 
 
 def optix(at):
-    """The scene renders through OptiX, on which no run of these shaders is recorded."""
-    return when(at.offers_osl and OPTIX_RUN is None and device.runs_on_optix(at.scene))
+    """The scene renders through OptiX with Open Shading Language, where no shader of this extension
+    has been run, and where too many closures would overwrite other memory."""
+    on = at.offers_osl and at.scene.cycles.shading_system
+    return when(on and device.gpu(at.scene) in device.OSL_DEVICES)

@@ -75,7 +75,13 @@ OF_SCENE = (
         scene_rules.device_of_another_computer,
         USE_CPU,
     ),
-    Row("optix_untested", ERROR, "These shaders are untested on OptiX devices", scene_rules.optix),
+    Row(
+        "optix_untested",
+        ERROR,
+        "These shaders are untested on OptiX: choose Automatic or Formula Nodes, or the CPU",
+        scene_rules.optix,
+        USE_CPU,
+    ),
 )
 
 #: About a group node, whatever its form.
@@ -321,22 +327,6 @@ OF_MATERIAL = (
         "more lamps is noisy in every material: use fewer models in it",
         material_rules.few_lamps,
         more="{slots} of {most} slots of closures, and {slots_per_lamp} a lamp",
-    ),
-    Row(
-        "closure_pool",
-        ERROR,
-        "The models of this material take more memory than OptiX has, and its picture is wrong: "
-        "use other render methods, fewer models in one material, or the CPU",
-        material_rules.too_much_memory,
-        more="{size} bytes of closures, and there is room for {room}",
-    ),
-    Row(
-        "closure_pool_shared",
-        WARNING,
-        "On OptiX the other shaders of this material share what memory its models leave",
-        material_rules.shared_memory,
-        more="there is room for {room} bytes of closures, of which the models take {size}, and "
-        "{per_lamp} a lamp",
     ),
 )
 

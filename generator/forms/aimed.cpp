@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cctype>
 
-#include "closures/closure_pool.h"
 #include "fit/roles.h"
 #include "forms/aimed_steps.h"
 #include "forms/error.h"
@@ -409,10 +408,8 @@ void Aimed::make_closures(ShaderBody& body) const {
   shader.lamps = setting.max_lamps;
   shader.operations += lamps.operations();
   shader.slots += (setting.max_lamps + 1) * slots(ClosureKind::PhongRamp);
-  shader.closure_bytes += ray_bytes(model);
   const bool aimed = setting.max_lamps > 0;
   const Statement ray = declare("vector", "ray", in_scene(aimed ? "ray" : "drawn"));
-  shader.lamp_bytes = aimed ? pool_bytes(ClosureKind::PhongRamp) + kPoolNode : 0;
   if (aimed) body.terms.push_back("aimed");
   if (model.has_through()) {
     body.add(ray);

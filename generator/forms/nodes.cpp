@@ -9,7 +9,6 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
-#include "closures/closure_pool.h"
 #include "forms/error.h"
 #include "forms/form.h"
 #include "forms/node_choices.h"
@@ -306,8 +305,6 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
   out.closures = int(first.closures.size() + first.of_base.size()) + int(parts.contains("draw")) + out.lamps;
   // The extension subtracts the slots of lamps that are not in use, with the count per lamp that other forms have.
   out.slots = out.closures - out.lamps + out.lamps * slots(ClosureKind::PhongRamp);
-  out.closure_bytes = (out.closures - out.lamps) * (pool_bytes(ClosureKind::Ggx) + kPoolNode);
-  out.lamp_bytes = out.lamps > 0 ? pool_bytes(ClosureKind::GlossyToon) + kPoolNode : 0;
   out.source = Json{{"format", 5},
                     {"isotropic", model.info().properties.isotropic},
                     {"narrow", kNarrow},

@@ -7,7 +7,6 @@
 #include <set>
 #include <utility>
 
-#include "closures/closure_pool.h"
 #include "core/error.h"
 #include "forms/albedo_output.h"
 #include "model/horizon.h"
@@ -137,8 +136,6 @@ std::vector<Recording> record_bending(const Model& model) {
   return {recording_of(model, std::move(rise)), recording_of(model, std::move(bend))};
 }
 
-int ray_bytes(const Model& model) { return pool_bytes(ClosureKind::PhongRamp) + (model.has_through() ? kPoolNode : 0); }
-
 Statements declare_draws() {
   print::Declare numbers{"float", {}};
   for (int i = 0; i < 3; ++i) numbers.variables.push_back({fmt::format("u_{}", i), {element("u_all", i)}});
@@ -200,7 +197,6 @@ void ShaderBody::declare(const std::vector<RecordedClosure>& closures, const std
     shader.leaning = shader.leaning || closures[c].turned;
     terms.push_back(closure_of(closures[c], c, diffuse_n));
     shader.slots += slots(kind);
-    shader.closure_bytes += pool_bytes(kind);
   }
 }
 
@@ -281,11 +277,9 @@ Shader OslForm::write(const Model& model, const measure::AlbedoTable& table, con
     append(body, print::scope(mirror.statements()));
     made.terms.push_back(Value("mirror_weight") * call("reflection", {"frame_n"}));
     shader.slots += slots(ClosureKind::Reflection);
-    shader.closure_bytes += pool_bytes(ClosureKind::Reflection);
   }
   append(body, made.statements);
   shader.closures = int(made.terms.size()) + std::max(shader.lamps - 1, 0);
-  shader.closure_bytes += std::max(int(made.terms.size()) - (shader.lamps > 0 ? 1 : 0) - 1, 0) * kPoolNode;
   if (shader.slots > kMaxClosures)
     input_error("{}: the {} form needs {} closure slots, and Cycles keeps {}", info.name, name(), shader.slots,
                 kMaxClosures);

@@ -75,8 +75,4 @@ print::Statement lost_below(const Model&, const std::string& wi, const std::stri
 /// which has no mirror direction; Blender's Diffuse node leaves its normal unchanged, too.
 std::vector<Recording> record_bending(const Model&);
 
-/// Memory that the lobe of a drawn direction takes in a GPU's closure pool. If it may be another closure instead, OSL
-/// also stores a product of that closure and its weight.
-int ray_bytes(const Model&);
-
 }  // namespace brdfc::forms

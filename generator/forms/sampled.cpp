@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The sampled form: the shader draws one direction from the model per sample, and emits it as a narrow lobe.
-#include "closures/closure_pool.h"
 #include "forms/error.h"
 #include "forms/osl_form.h"
 
@@ -48,7 +47,6 @@ class Sampled final : public OslForm {
     body.terms.push_back(body.model.has_through() ? print::call("brdfc_ray_anywhere", {"weight", "wi", "I", "frame_n"})
                                                   : print::Value("weight") * print::call("brdfc_ray", {"wi", "I"}));
     body.shader.slots = slots(ClosureKind::PhongRamp);
-    body.shader.closure_bytes = ray_bytes(body.model);
   }
 };
 

@@ -8,18 +8,16 @@
 namespace brdfc::forms {
 
 struct Shader {
-  std::string name;       ///< name of the shader; its file adds .osl, or .json for a form made of nodes
-  std::string source;     ///< complete source text
-  std::string albedo;     ///< source of a separate shader for the Albedo output; empty if `source` contains it
-  int closures = 0;       ///< maximum number of closures that one shading point adds
-  int slots = 0;          ///< slots that they take, of Cycles' kMaxClosures
-  int operations = 0;     ///< maximum over the combinations of choices; the body of a loop counts once
-  int statements = 0;     ///< for all combinations of choices, without the library functions
-  bool facets = false;    ///< uses microfacet closures
-  bool leaning = false;   ///< uses closures with their own normals, which Bump Map Correction changes
-  int lamps = 0;          ///< number of lamp slots
-  int closure_bytes = 0;  ///< maximum that the closures take of a GPU's kPoolBytes without any lamp
-  int lamp_bytes = 0;     ///< additional bytes for each lamp
+  std::string name;      ///< name of the shader; its file adds .osl, or .json for a form made of nodes
+  std::string source;    ///< complete source text
+  std::string albedo;    ///< source of a separate shader for the Albedo output; empty if `source` contains it
+  int closures = 0;      ///< maximum number of closures that one shading point adds
+  int slots = 0;         ///< slots that they take, of Cycles' kMaxClosures
+  int operations = 0;    ///< maximum over the combinations of choices; the body of a loop counts once
+  int statements = 0;    ///< for all combinations of choices, without the library functions
+  bool facets = false;   ///< uses microfacet closures
+  bool leaning = false;  ///< uses closures with their own normals, which Bump Map Correction changes
+  int lamps = 0;         ///< number of lamp slots
 };
 
 /// If the table for the Albedo output is longer than this, it gets a separate shader, because most materials leave that

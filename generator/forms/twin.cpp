@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "closures/closure_pool.h"
 #include "fit/roles.h"
 #include "forms/made_of_fit.h"
 
@@ -126,15 +125,9 @@ Shader Twin::write(const Model& model, const measure::AlbedoTable&, const Settin
       j["spread"] = rows_of(part.spread);
     }
     closures.push_back(j);
-    const int nodes = has_facets(part.kind) ? 2 : 1;
-    out.closures += nodes;
-    // With Open Shading Language, Blender's nodes use the same closures; its mirror is a microfacet closure without
-    // roughness.
-    const bool glossy = part.kind != ClosureKind::Diffuse;
-    out.closure_bytes += nodes * pool_bytes(glossy ? ClosureKind::Ggx : ClosureKind::Diffuse);
+    out.closures += has_facets(part.kind) ? 2 : 1;
   }
   out.slots = out.closures;
-  out.closure_bytes += std::max(out.closures - 1, 0) * kPoolNode;
   const Rgb<double> tint = twin.tint().value_or(Rgb<double>(1.0));
   const std::optional<fit::FitAxis>& axis = twin.axis();
   const Json over = axis ? Json{{"parameter", axis->parameter},

@@ -8,7 +8,6 @@
 #include <map>
 #include <mutex>
 
-#include "closures/closure_pool.h"
 #include "core/hash.h"
 #include "core/parse.h"
 #include "core/process.h"
@@ -159,8 +158,6 @@ BuiltModel build_model(const plan::PlannedModel& plan, const measure::AlbedoTabl
         {"only", values_json(form->values(model, plan.fixed))},
         {"closures", shader.closures},
         {"slots", shader.slots},
-        {"closure_bytes", shader.closure_bytes},
-        {"lamp_bytes", shader.lamp_bytes},
         {"operations", shader.operations},
         {"error", error_json(error)},
         {"cost", cost ? Json(*cost) : Json()},
@@ -215,11 +212,9 @@ Result build_pack(const Options& options) {
   tbb::parallel_for(std::size_t(0), chosen.size(), build, tbb::simple_partitioner());
 
   Result result;
-  // Blender's nodes that combine closures also take memory of the pool: Mix Shader makes two products and their sum.
   Json manifest = {{"format", 1},
                    {"generator", std::string(kGenerator) + BRDFC_VERSION},
                    {"hash", ""},
-                   {"closure_pool", {{"bytes", kPoolBytes}, {"mix", 3 * kPoolNode}, {"add", kPoolNode}}},
                    {"closure_slots", {{"most", kMaxClosures}, {"lamp", slots(ClosureKind::PhongRamp)}}},
                    {"lobes", {{"most", kMostLobes}, {"fitted", kFittedLobes}}},
                    {"looks", looks_json()},

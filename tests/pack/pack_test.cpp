@@ -9,7 +9,6 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "closures/closure_pool.h"
 #include "forms/aimed.h"
 #include "forms/form.h"
 #include "measure/fold.h"
@@ -144,38 +143,6 @@ TEST(Shader, EveryFormStaysInsideWhatCyclesKeeps) {
       const bool aimed = kind == forms::form("aimed");
       EXPECT_LT(s.operations, name == "factors" ? 2400 : !aimed ? 600 : name == "lossless" ? 2900 : 1450) << s.name;
       EXPECT_THAT(s.source, HasSubstr("shader " + s.name + "("));
-    }
-}
-
-/// Sizes computed by hand from Cycles' structs: see pool_bytes().
-TEST(Shader, CountsTheBytesThatItsClosuresTakeOfAGpu) {
-  const auto bytes = [](const char* name, const forms::Form* kind, int lamps = forms::kMaxLamps) {
-    const Model& m = find_model(name);
-    const forms::Shader s = kind->write(m, empty_table(m), {{}, {}, lamps});
-    return std::pair(s.closure_bytes, s.lamp_bytes);
-  };
-  constexpr int kLobe = 16 + 120, kFacets = 16 + 56, kMirror = 16 + 24, kDiffuse = 16 + 24, kCone = 16 + 32, kNode = 24;
-  // burley_diffuse_bsdf, diffuse_ramp and a mirror
-  EXPECT_EQ(bytes("coupled", forms::form("exact")), std::pair(16 + 40 + 16 + 120 + kMirror + 2 * kNode, 0));
-  EXPECT_EQ(bytes("lambert", forms::form("exact")), std::pair(kDiffuse, 0));
-  // A mirror, and a refraction for each channel.
-  EXPECT_EQ(bytes("glass", forms::form("exact")), std::pair(kMirror + 3 * (16 + 24 + kNode), 0));
-  // A lamp's lobe is one closure in the sum. A direction through the surface is one of three closures, times a weight.
-  EXPECT_EQ(bytes("lambert", forms::form("sampled")), std::pair(kLobe, 0));
-  EXPECT_EQ(bytes("phong", forms::form("aimed")), std::pair(5 * (kCone + kNode) + kLobe, kLobe + kNode));
-  EXPECT_EQ(bytes("phong", forms::form("aimed"), 0), std::pair(5 * (kCone + kNode) + kLobe, 0));
-  EXPECT_EQ(bytes("ward", forms::form("aimed")), std::pair(kFacets + kLobe + kNode, kLobe + kNode));
-  EXPECT_EQ(bytes("schlick_double", forms::form("aimed")),
-            std::pair(kDiffuse + kMirror + kLobe + 2 * kNode, kLobe + kNode));
-  EXPECT_EQ(bytes("radziszewski_alda", forms::form("aimed")), std::pair(kLobe + kNode, kLobe + kNode));
-}
-
-TEST(Shader, AnAimedFormHasAtLeastALampInAGpusPool) {
-  for (const auto& [name, model] : models())
-    for (const forms::Form* kind : forms::forms_of(*model)) {
-      if (kind->made_of_fit()) continue;  // eight closures, most of them ramps
-      const forms::Shader s = kind->write(*model, empty_table(*model));
-      EXPECT_LE(s.closure_bytes + s.lamp_bytes, kPoolBytes) << s.name;
     }
 }
 
@@ -368,9 +335,6 @@ TEST_F(PackFiles, ManifestAndFilesAgree) {
   EXPECT_EQ(manifest.at("format"), 1);
   const auto& lambert = manifest.at("models").at("lambert");
   EXPECT_EQ(lambert.at("auto"), "exact");
-  EXPECT_EQ(manifest.at("closure_pool"), (nlohmann::json{{"bytes", 1016}, {"mix", 72}, {"add", 24}}));
-  EXPECT_EQ(lambert.at("representations").at("exact").at("closure_bytes"), 40);
-  EXPECT_EQ(lambert.at("representations").at("exact").at("lamp_bytes"), 0);
   for (const auto& [form, r] : lambert.at("representations").items())
     EXPECT_TRUE(
         fs::exists(pack.folder / r.at(form == "twin" || form == "nodes" ? "nodes" : "shader").get<std::string>()))

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Counts how much of Cycles' closure storage at a shading point a material takes.
+"""Counts how many of Cycles' closure slots at a shading point a material takes.
 
-On every device the number of closures is limited: one that finds no free slot is dropped, and its
-light is lost. On OptiX the number of bytes is limited as well, and Cycles does not check it. The
-sizes of the models' closures come from the generator (closures/closure.h, closures/closure_pool.h).
+A closure that finds no free slot is dropped, and its light is lost. The slots of the models'
+closures come from the generator (closures/closure.h).
 """
 
 from dataclasses import dataclass
@@ -40,32 +39,19 @@ _PRINCIPLED_SLOTS = {
 
 @dataclass(frozen=True)
 class ClosureUsage:
-    """What the shaders of a material take: closure slots without lamps and for each lamp; likewise
-    bytes on OptiX, of the models and of the nodes that combine them; and whether there are other
-    shaders, whose sizes are unknown."""
+    """The closure slots that the shaders of a material take without lamps, and for each lamp."""
 
     slots: int
     slots_per_lamp: int
-    size: int
-    per_lamp: int
-    has_others: bool
 
-    def lamps(self, on_optix):
+    def lamps(self):
         """How many lamps there is room for; None if nothing aims at lamps."""
         if not self.slots_per_lamp:
             return None
-        room = (most_slots() - self.slots) // self.slots_per_lamp
-        if on_optix:
-            room = min(room, (capacity() - self.size) // self.per_lamp)
-        return max(room, 0)
+        return max((most() - self.slots) // self.slots_per_lamp, 0)
 
 
-def capacity():
-    """Size of OptiX's closure memory in bytes."""
-    return pack.manifest()["closure_pool"]["bytes"]
-
-
-def most_slots():
+def most():
     """The number of closure slots in Cycles."""
     return pack.manifest()["closure_slots"]["most"]
 
@@ -90,31 +76,25 @@ def _times(node):
 
 def of_material(material):
     """The ClosureUsage of a material: of all nodes that its output for Cycles depends on."""
-    pool, a_lamp = pack.manifest()["closure_pool"], pack.manifest()["closure_slots"]["lamp"]
-    joining = {"ShaderNodeMixShader": pool["mix"], "ShaderNodeAddShader": pool["add"]}
-    slots, slots_per_lamp, size, per_lamp, has_others = 0, 0, 0, 0, False
+    a_lamp = pack.manifest()["closure_slots"]["lamp"]
+    slots, slots_per_lamp = 0, 0
     for node in (shown.node for shown in shader_trees.shown(material)):
         if nodes.is_ours(node) and (made := nodes.manifest_entry(node)):
             aimed_at = made[0].get("lamps") or 0
             slots += _times(node) * (made[0].get("slots", 0) - aimed_at * a_lamp)
             slots_per_lamp += _times(node) * a_lamp * bool(aimed_at)
-            size += made[0]["closure_bytes"]
-            per_lamp += made[0]["lamp_bytes"]
-        elif nodes.is_ours(node) or node.bl_idname not in joining:
-            slots += _times(node) * _native_slots(node)
-            has_others = True
         else:
-            size += joining.get(node.bl_idname, 0)
-    return ClosureUsage(slots, slots_per_lamp, size, per_lamp, has_others)
+            slots += _times(node) * _native_slots(node)
+    return ClosureUsage(slots, slots_per_lamp)
 
 
-def lamps_that_fit(on_optix):
+def lamps_that_fit():
     """(count, material): how many lamps the materials of the open file can aim at, and the material
     that sets this limit. All materials share one list of lamps, so the largest material decides.
     None if no material aims at lamps."""
     rooms = [
         (room, material)
         for material in bpy.data.materials
-        if material.users and (room := of_material(material).lamps(on_optix)) is not None
+        if material.users and (room := of_material(material).lamps()) is not None
     ]
     return min(rooms, key=lambda found: found[0], default=None)
