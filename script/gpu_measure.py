@@ -3,12 +3,15 @@
 
 Needs `bpy` with NumPy, and the files that script/gpu puts beside this one: the machine may have
 neither the tool nor a network. `expect` computes the expected values, with the tool. `measure`
-renders on one device and adds to a JSON file after each step, so that results survive a crash.
+renders on one device and adds to a JSON file after each step, so that results survive a crash. The
+devices' kernels may be compiled at the same time, but only one process at a time measures.
 `compare` prints tables of such files.
 """
 
 import argparse
+import contextlib
 import datetime
+import fcntl
 import json
 import math
 import os
@@ -27,7 +30,11 @@ MODES = {
     "cuda": ("CUDA", False),
     "optix": ("OPTIX", False),
     "optix-osl": ("OPTIX", True),
+    "optix-osl-unoptimized": ("OPTIX", True),
 }
+#: The driver may take many minutes to optimise OptiX' kernel for OSL. Cycles can ask it not to
+#: optimise; times have no meaning then.
+UNOPTIMIZED = "optix-osl-unoptimized"
 #: Direction towards the sun for the facets; the camera is above them.
 SUN = (0.5, 0.2, 0.8)
 FACETS = 100
@@ -43,16 +50,31 @@ STIFF = {
     "schlick": {"rough": 0.01, "p": 0.5},
     "ward": {"ax": 0.02, "ay": 0.3},
 }
-#: Models on the ball: the first ones under every number of lamps, the others under four.
-BALLS = {"ashikhmin_shirley": {}, "ward": {}}
+#: Models on the ball: the first ones under every number of lamps and the other lights, the others
+#: under four lamps.
+BALLS = {"ashikhmin_shirley": {}, "ward": {}, "microfacet": {}}
 OTHERS = {
     "cook_torrance": {},
     "radziszewski_alda": {"n": 4.0},
     "coupled": {},
     "schlick": {},
+    "eon": {},
+    "oren_nayar": {},
     "phong": {"e": 100.0},
 }
-LAMPS = (0, 1, 2, 4, 8)
+#: Numbers of point lamps, and names of conditions in noise_scenes.
+LAMPS, LIGHTS = (0, 1, 2, 4, 8), ("area", "sun", "sky_texture")
+#: The models of the picture, which people look at.
+PICTURE = (
+    "ashikhmin_shirley",
+    "ward",
+    "microfacet",
+    "cook_torrance",
+    "radziszewski_alda",
+    "coupled",
+    "eon",
+    "glossy_reflector",
+)
 BLOCK = 8
 
 
@@ -103,7 +125,13 @@ def empty_scene():
 
 
 def set_device(scene, mode):
+    import bpy
+
     kind, osl = MODES[mode]
+    if mode == UNOPTIMIZED:  # Cycles reads this setting of its developers only with these two
+        bpy.context.preferences.view.show_developer_ui = True
+        bpy.context.preferences.experimental.use_cycles_debug = True
+        scene.cycles.debug_use_optix_debug = True
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU" if kind == "CPU" else "GPU"
     scene.cycles.shading_system = osl
@@ -162,14 +190,13 @@ def expect(folder, tool):
     (Path(folder) / "facets.json").write_text(json.dumps(out), encoding="utf-8")
 
 
-def measure_facets(folder, modules, mode, form):
-    """[{model, values, form, relative L1}] for a form if a model has it, otherwise for `auto`."""
+def measure_facets(folder, modules, mode):
+    """[{model, values, form, relative L1}] of every case."""
     import numpy as np
 
-    models = modules["pack"].manifest()["models"]
     expected = read(Path(folder) / "facets.json")
     cases = [(e["model"], e["values"]) for e in expected]
-    forms = [form if form in models[n]["representations"] else "auto" for n, _ in cases]
+    forms = [form_of(modules, n, mode) for n, _ in cases]
     start = time.perf_counter()
     meter, which, wi = facets(modules, cases, forms, mode, 64)
     made = time.perf_counter()
@@ -195,7 +222,8 @@ def measure_facets(folder, modules, mode, form):
 
 
 def ball_scene(modules, model, values, form, lamps, size, mode):
-    """A ball with a material on a floor, under this number of point lamps and a dim sky."""
+    """A ball with a material on a floor, under this number of point lamps, or another light, and a
+    dim sky."""
     import noise_scenes
     from mathutils import Vector
 
@@ -203,14 +231,17 @@ def ball_scene(modules, model, values, form, lamps, size, mode):
     noise_scenes.settings(scene, size)
     scene.render.threads_mode = "AUTO"
     scene.render.use_persistent_data = True
-    noise_scenes.world(scene, 0.2)
+    if lamps != "sky_texture":
+        noise_scenes.world(scene, 0.2)
     floor = [noise_scenes.rectangle(-20, 20, -20, 20, 0)]
     noise_scenes.quads(scene, "Floor", noise_scenes.grey("Floor", 0.5), floor)
     ball = noise_scenes.sphere(scene, "Ball", None, 1.0, noise_scenes.CENTRE)
     distance = (noise_scenes.CAMERA - noise_scenes.CENTRE).length
     angle = 2 * math.atan(math.tan(math.asin(1 / distance)) * 7 / 6)
     noise_scenes.camera(scene, noise_scenes.CAMERA, noise_scenes.CENTRE, angle)
-    for index in range(lamps):
+    if lamps in LIGHTS:
+        noise_scenes.CONDITIONS[lamps].light(scene, None)
+    for index in range(0 if lamps in LIGHTS else lamps):
         turn = 2.4 * index
         towards = Vector((math.sin(turn), -math.cos(turn), 0.4 + 0.15 * index)).normalized()
         noise_scenes.lamp(
@@ -237,7 +268,7 @@ def measure_ball(modules, mode, case, size, samples):
     made = time.perf_counter() - start
     times, pictures = {}, []
     # GPUs render as many samples at once as fit, so only a longer picture shows the time.
-    timed = samples * (16 if MODES[mode][0] != "CPU" else 1)
+    timed = samples * (1 if MODES[mode][0] == "CPU" or mode == UNOPTIMIZED else 16)
     for name, seed, count in (
         ("first", 1, 1),
         ("shortest", 1, 1),
@@ -276,19 +307,83 @@ def measure_ball(modules, mode, case, size, samples):
     }
 
 
-def ball_cases(mode, tiny):
+def form_of(modules, model, mode):
+    """`nodes` without OSL; with OSL `aimed`, or what `auto` chooses for models that are exact."""
+    if not MODES[mode][1]:
+        return "nodes"
+    forms = modules["pack"].manifest()["models"][model]["representations"]
+    return "aimed" if "aimed" in forms else "auto"
+
+
+def ball_cases(modules, mode, tiny):
     """[(model, values, form, lamps)], the most important first."""
-    forms = ["nodes"] if not MODES[mode][1] else ["aimed"]
-    lamps = (1, 4) if tiny else LAMPS
+    osl = MODES[mode][1]
+    cpu = MODES[mode][0] == "CPU"  # slow, and only there to be compared with
+    lamps = (1, 4) if tiny else ((4,) if cpu else LAMPS) + LIGHTS
     cases = [("glossy", {}, "glossy", n) for n in lamps]
     some = dict(list(BALLS.items())[:1]) if tiny else BALLS
-    cases += [(m, v, f, n) for m, v in some.items() for f in forms for n in lamps]
-    if not tiny:
-        cases += [(m, v, f, 4) for m, v in OTHERS.items() for f in forms]
-        if mode == "optix-osl" or mode == "cpu-osl":
-            cases += [(m, v, "nodes", 4) for m, v in list(BALLS.items())[:1]]
-            cases += [(m, v, "sampled", 4) for m, v in list(BALLS.items())[:1]]
-    return cases
+    cases += [(m, v, form_of(modules, m, mode), n) for m, v in some.items() for n in lamps]
+    if tiny:
+        return cases
+    if osl:  # the other forms
+        models = modules["pack"].manifest()["models"]
+        forms = [f for f in models["ashikhmin_shirley"]["representations"] if f != "aimed"]
+        cases += [("ashikhmin_shirley", {}, f, 4) for f in forms]
+    return cases + [(m, v, form_of(modules, m, mode), 4) for m, v in OTHERS.items()]
+
+
+def write_picture(modules, mode, path, size, samples):
+    """Renders balls of PICTURE's models under an area lamp and a point lamp, to look at."""
+    import bpy
+    import noise_scenes
+    from mathutils import Vector
+
+    scene = empty_scene()
+    noise_scenes.settings(scene, size)
+    scene.render.resolution_x = 2 * size
+    scene.cycles.samples = samples
+    noise_scenes.world(scene, 0.3)
+    floor = [noise_scenes.rectangle(-40, 40, -40, 40, 0)]
+    noise_scenes.quads(scene, "Floor", noise_scenes.grey("Floor", 0.4), floor)
+    for index, model in enumerate(PICTURE):
+        place = (2.3 * (index % 4 - 1.5), 2.6 * (index // 4), 1)
+        material = modules["api"].new_material(model, form_of(modules, model, mode))
+        noise_scenes.sphere(scene, model, material, 1.0, place)
+    noise_scenes.area(scene, None)
+    towards = Vector((-0.7, -0.4, 0.6)).normalized()
+    noise_scenes.lamp(scene, "POINT", "Point", towards, share=0.6, shadow_soft_size=0.1)
+    noise_scenes.camera(scene, Vector((0, -12, 6)), Vector((0, 1, 1)), math.radians(24))
+    set_device(scene, mode)
+    modules["api"].see_lamps(scene)
+    image = scene.render.image_settings
+    image.file_format, image.color_mode, image.color_depth = "PNG", "RGB", "8"
+    scene.view_settings.view_transform = "Standard"
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+
+
+@contextlib.contextmanager
+def turn(folder):
+    """Waits until no other process measures."""
+    with open(Path(folder) / "turn", "w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def compile_kernel(mode):
+    """Renders one pixel. Returns the seconds, which with a GPU are those of its kernel."""
+    import noise_scenes
+    from helpers import render
+
+    scene = empty_scene()
+    noise_scenes.settings(scene, 1)
+    scene.cycles.samples = 1
+    noise_scenes.world(scene)
+    noise_scenes.camera(scene, noise_scenes.CAMERA, noise_scenes.CENTRE, 1)
+    set_device(scene, mode)
+    start = time.perf_counter()
+    render(scene)
+    return time.perf_counter() - start
 
 
 def driver():
@@ -331,20 +426,34 @@ def measure(folder, mode, out, tiny):
     if not result["devices"]:
         print(f"{mode}: no device")
         return
-    print(f"{mode}: {', '.join(result['devices'])}")
-    size, samples = (64, 16) if tiny else (160, 128)
+    print(f"{mode}: {', '.join(result['devices'])}", flush=True)
+    result["kernel_s"] = compile_kernel(mode)
+    print(f"  first pixel after {result['kernel_s']:.1f} s", flush=True)
+    keep()
+    with turn(Path(out).parent):
+        measure_all(folder, modules, mode, out, result, keep, tiny)
+
+
+def measure_all(folder, modules, mode, out, result, keep, tiny):
+    """Adds facets and balls to the result, and keeps it after each of them."""
+    osl = MODES[mode][1]
+    size, samples = (64, 16) if tiny else (160, 32 if MODES[mode][0] == "CPU" else 128)
 
     def measure_the_facets():
-        form = "aimed" if osl else "nodes"
-        result["facets"] = measure_facets(folder, modules, mode, form)
+        result["facets"] = measure_facets(folder, modules, mode)
         keep()
         for row in result["facets"]["rows"]:
             print(f"  {row['model']} {row['values'] or ''} {row['form']}: {row.get('off', 0):.2g}")
 
+    def look():
+        path = Path(out).with_suffix(".png")
+        write_picture(modules, mode, path, 3 * size, (4 if mode.startswith("cpu") else 512))
+
     # With OSL every shader is compiled for the device, which may take minutes.
     if not osl:
         measure_the_facets()
-    for case in ball_cases(mode, tiny):
+        look()
+    for case in ball_cases(modules, mode, tiny):
         try:
             row = measure_ball(modules, mode, case, size, samples)
         except Exception as error:  # continues with the next case
@@ -354,6 +463,7 @@ def measure(folder, mode, out, tiny):
         shown = row.get("error") or f"{row['ns_per_sample']:.0f} ns, mean {row['mean'][1]:.5f}"
         print(f"  {case[0]} {case[2]} {case[3]} lamps: {shown}", flush=True)
     if osl:
+        look()
         measure_the_facets()
     result["complete"] = True
     keep()
