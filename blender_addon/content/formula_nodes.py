@@ -28,7 +28,7 @@ class _Surface:
         self.interpolated = geometry.outputs["Normal"]
         self.strand = w.node("ShaderNodeHairInfo").outputs["Is Strand"]
         path = w.node("ShaderNodeLightPath")
-        self.path_length, self.camera = path.outputs["Ray Length"], path.outputs["Is Camera Ray"]
+        self.path_length = path.outputs["Ray Length"]
         missing = w.math("LESS_THAN", w.vector("LENGTH", normal, output="Value"), 0.5)
         own = w.scaled(geometry.outputs["Normal"], missing)
         self.normal = w.vector("NORMALIZE", w.vector("ADD", normal, own))
@@ -352,7 +352,7 @@ def _wired(w, data, normal, tangent, parameters, of_slots, title):
         # Cycles darkens closures about normals of their own, by Bump Map Correction or, from
         # Blender 5.0 on, below the interpolated normal.
         bent = w.vector("DISTANCE", surface.normal, surface.interpolated, output="Value")
-        given |= {"stands": w.math("LESS_THAN", bent, 1e-4), "camera": surface.camera}
+        given |= {"stands": w.math("LESS_THAN", bent, 1e-4)}
         given |= parts.add("base", **given)
         shaders += [_of_base(w, closure, given, surface) for closure in data["base"]]
     lamps = []

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether Cycles' Filter Glossy makes pictures of a node and of its model different: after a bounce
-that spreads the light, it blurs the lobes of Blender's nodes, and not those of models.
+that spreads the light, it blurs the lobes of Blender's nodes, and those of Formula Nodes, but not
+those of shaders in Open Shading Language.
 
 Measured for a floor in a room with white walls under an area lamp, by renders of Blender's node
 (tests/blender/test_filter_glossy.py). At a setting of 1 the picture of metal gets 10 % darker at a
@@ -9,6 +10,7 @@ roughness of 0.1, 7 % at 0.3, 2 % at 0.6, 0 % at 0.7; that of black plastic 1.2 
 """
 
 from ..common.i18n import say
+from ..packs import device
 
 #: Where the picture changes by 1 %: the setting, the roughness of metal and of plastic, and the
 #: Metallic from which a node counts as metal.
@@ -25,12 +27,13 @@ def is_filtered(native):
 
 def warning(plans, scene):
     """A sentence if a scene has Filter Glossy and that shows in what plans convert; else None."""
-    setting = scene.cycles.blur_glossy if scene.render.engine == "CYCLES" else 0
+    shaders_run = scene.render.engine == "CYCLES" and not device.lacks_osl(scene)
+    setting = scene.cycles.blur_glossy if shaders_run else 0
     if setting < _SETTING or not any(plan.filtered and not plan.refusal for plan in plans):
         return None
     return say(
         "Filter Glossy is {value}: in light that other surfaces scatter, it blurs Blender's nodes "
-        "and not their models. Pictures differ by up to 11 % with metals, by 1 % with plastics. 0 "
+        "and not their models in Open Shading Language. Pictures differ by up to 11 % with metals, by 1 % with plastics. 0 "
         "is exact",
         value=f"{setting:g}",
     )

@@ -56,9 +56,9 @@ std::optional<ClosureSum<Expr>> native_closures(const Model& model, const Brdf<E
 }
 
 /// Closures that are nowhere brighter than the model. Choices must be bound. The sockets of the closures are outputs of
-/// the program. The program reads `stands`, which is 0 where normals are bent and Cycles would darken matte closures,
-/// and `camera`, which is 1 for camera rays: for other rays, Filter Glossy increases the roughness of microfacets. The
-/// returned closures have these weights as inputs, for use in other programs.
+/// the program. The program reads `stands`, which is 0 where normals are bent and Cycles would darken matte closures.
+/// The returned closures have these weights as inputs, for use in other programs. Where Filter Glossy increases the
+/// roughness of facets, they keep their light, and the program's other parts remain those of the facets without it.
 ClosureSum<Expr> record_base(const Model& model, const ParamValues& fixed, const Brdf<Expr>& brdf, Program& program,
                              Json& closures) {
   const Under* of = under(model);
@@ -78,7 +78,7 @@ ClosureSum<Expr> record_base(const Model& model, const ParamValues& fixed, const
     std::array<double, 3> known{1, 1, 1};
     const bool is_black = color.is_constant(&known) && known == std::array<double, 3>{};
     // Facets are not matte, so bent normals do not darken them.
-    output("weight", color * Expr::input(has_facets(c.kind) ? "camera" : "stands"));
+    output("weight", has_facets(c.kind) ? color : color * Expr::input("stands"));
     if (is_rough_matte) output("roughness", c.roughness);
     if (has_facets(c.kind)) {
       // As Blender's Glossy node has it: with r its squared Roughness, alpha is r (1 - anisotropy) along the tangent

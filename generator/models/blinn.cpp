@@ -11,6 +11,7 @@
 // Numerical stability: (n.h)^e is computed from 1 - (n.h)^2 = h_x^2 + h_y^2, which is precise near the normal.
 #include "model/base_terms.h"
 #include "model/power_lobe.h"
+#include "model/under.h"
 #include "model/v_cavity.h"
 
 namespace brdfc {
@@ -52,11 +53,11 @@ template <class T> struct Blinn {
 
   T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
     const HalfVector<T> k(wi, wo);
-    return select(above(wi, wo), v_cavity_pdf(k, D(k.h)), T(0));
+    return select(above(wi, wo), v_cavity_pdf(k, D(k.h), wo), T(0));
   }
 
   Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
-    const Vec3<T> h = sample_power_lobe(e + T(1), u.y, u.z);
+    const Vec3<T> h = visible_side(sample_power_lobe(e + T(1), u.y, u.z), wo, u.x);
     const T oh = named("oh", dot(wo, h));
     const Vec3<T> wi = h * (T(2) * oh) - wo;
     return sample_if(above(wi, wo), wi, ks * v_cavity_weight(h, oh, wi, wo), pdf(wi, wo));
@@ -68,8 +69,15 @@ template <class T> struct Blinn {
     const T scale = T(1) / (e + T(3));
     return {facets(ClosureKind::Beckmann, ks * ((e + T(2)) * scale), sqrt(T(2) * scale))};
   }
+
+  /// As in cook_torrance.cpp. (n.h)^e over Beckmann's distribution with the same peak is above exp(-tan^2 theta_h).
+  ClosureSum<T> under(const Vec3<T>& wo) const {
+    const T alpha = sqrt(T(2) / (e + T(2))), narrow = sqr(alpha) + narrow_towards_horizon(alpha, wo);
+    return {narrower_facets(ks, alpha, alpha, narrow, narrow)};
+  }
 };
 
 BRDFC_MODEL(Blinn)
+BRDFC_UNDER(Blinn)
 
 }  // namespace brdfc

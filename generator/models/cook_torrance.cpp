@@ -11,6 +11,7 @@
 // F is Schlick's approximation with the reflectance f0 at normal incidence. The paper instead solves f0 for a
 // refractive index and uses the Fresnel equations. Schlick's F is linear in f0, as the tables of the albedo require.
 #include "model/base_terms.h"
+#include "model/under.h"
 #include "model/v_cavity.h"
 
 namespace brdfc {
@@ -56,11 +57,11 @@ template <class T> struct CookTorrance {
 
   T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
     const HalfVector<T> k(wi, wo);
-    return select(above(wi, wo), v_cavity_pdf(k, D(k.h)), T(0));
+    return select(above(wi, wo), v_cavity_pdf(k, D(k.h), wo), T(0));
   }
 
   Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
-    const Vec3<T> h = sample_gaussian_slopes(m, m, u.y, u.z);
+    const Vec3<T> h = visible_side(sample_gaussian_slopes(m, m, u.y, u.z), wo, u.x);
     const T oh = named("oh", dot(wo, h));
     const Vec3<T> wi = h * (T(2) * oh) - wo;
     return sample_if(above(wi, wo), wi, F(clamp01(T(1) - oh)) * v_cavity_weight(h, oh, wi, wo), pdf(wi, wo));
@@ -71,8 +72,15 @@ template <class T> struct CookTorrance {
     const T height = lobe_height(wo.z, T(0.7) * m * m * sin2_theta(wo));
     return {facets(ClosureKind::Beckmann, F(clamp01(T(1) - height)), m)};
   }
+
+  /// With the reflectance at normal incidence. V-shaped cavities mask nothing about the mirror direction.
+  ClosureSum<T> under(const Vec3<T>& wo) const {
+    const T narrow = narrow_towards_horizon(m, wo);
+    return {narrower_facets(f0, m, m, narrow, narrow)};
+  }
 };
 
 BRDFC_MODEL(CookTorrance)
+BRDFC_UNDER(CookTorrance)
 
 }  // namespace brdfc

@@ -14,6 +14,7 @@
 // Sampling follows B. Walter: Notes on the Ward BRDF, Cornell PCG-05-06, 2005: Gaussian slopes, then reflection.
 #include "model/base_terms.h"
 #include "model/half_vector.h"
+#include "model/under.h"
 
 namespace brdfc {
 
@@ -101,8 +102,20 @@ template <class T> struct Ward {
     if (normalisation == Original) weight = weight * lobe_height(wo.z, sqr(ax * sx * wo.x) + sqr(ay * sy * wo.y));
     return {facets(ClosureKind::Beckmann, ks * weight, ax * sx, ay * sy, T(0))};
   }
+
+  /// f over that of microfacets with E, without masking, is (n.i)(n.o) / (o.h)^2 if bounded, which is 1 for the mirror
+  /// direction, and (n.h)^4 > exp(-2 tan^2 theta_h) with Duer's normalisation. The original one has none: towards the
+  /// horizon it falls below any lobe of the right height.
+  ClosureSum<T> under(const Vec3<T>& wo) const {
+    const Rgb<T> weight = normalisation == Original ? Rgb<T>(T(0)) : ks;
+    const auto narrow = [&](const T& a) {
+      return normalisation == Duer ? T(2) * sqr(a) : narrow_towards_horizon(a, wo);
+    };
+    return {narrower_facets(weight, ax, ay, narrow(ax), narrow(ay))};
+  }
 };
 
 BRDFC_MODEL(Ward)
+BRDFC_UNDER(Ward)
 
 }  // namespace brdfc

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cycles' Filter Glossy blurs Blender's nodes and not their models: what Convert says of it is what
-pictures show."""
+"""Cycles' Filter Glossy blurs Blender's nodes and Formula Nodes, and not shaders in Open Shading
+Language: what Convert says of it is what pictures show."""
 
 import bpy
 import helpers
@@ -66,12 +66,13 @@ def pictures(scene, floor, material):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("osl", [False, True])
 @pytest.mark.parametrize(("node", "differs"), CASES)
-def test_convert_says_whether_the_setting_shows(extension, convert, empty, node, differs):
+def test_convert_says_whether_the_setting_shows(extension, convert, empty, node, differs, osl):
     kind, inputs = node
     material, _ = material_of(kind, None if kind == "diffuse" else "GGX", **inputs)
     copy, floor = material.copy(), room(empty, material)
-    empty.cycles.shading_system = False
+    empty.cycles.shading_system = osl
     plan = only(extension.api.plan_conversion([copy]))
     empty.cycles.blur_glossy = 1.0
     said = extension.api.conversion_warning([plan], empty)
@@ -80,8 +81,8 @@ def test_convert_says_whether_the_setting_shows(extension, convert, empty, node,
     # What the setting alone does, beyond what the model is off without it.
     off = np.abs((model[1] - native[1]) - (model[0] - native[0])).sum() / native[1].sum()
     print(f"{kind} {inputs}: {100 * off:.2f} %, said: {said}")
-    assert plan.filtered == differs and bool(said) == differs
-    assert off > 0.01 if differs else off < 0.01
+    assert plan.filtered == differs and bool(said) == (differs and osl)
+    assert off > 0.01 if differs and osl else off < 0.01
 
 
 def test_the_warning_is_of_what_is_converted_with_the_setting(extension, convert, empty):
@@ -89,6 +90,7 @@ def test_the_warning_is_of_what_is_converted_with_the_setting(extension, convert
     material, node = material_of(kind, "GGX", **inputs)
     ask = extension.api.conversion_warning
     plans = extension.api.plan_conversion([material])
+    extension.api.enable_osl(empty)
     empty.cycles.blur_glossy = 0.05
     assert ask(plans, empty) is None
     empty.cycles.blur_glossy = 0.5
@@ -96,6 +98,9 @@ def test_the_warning_is_of_what_is_converted_with_the_setting(extension, convert
     empty.render.engine = "BLENDER_WORKBENCH"
     assert ask(plans, empty) is None
     empty.render.engine = "CYCLES"
+    empty.cycles.shading_system = False
+    assert ask(plans, empty) is None
+    empty.cycles.shading_system = True
     node.inputs["Coat Weight"].default_value = 0.5
     assert ask(extension.api.plan_conversion([material]), empty) is None
 
@@ -104,6 +109,7 @@ def test_the_button_reports_it(extension, convert, empty):
     kind, inputs = metal(0.1)
     ball = helpers.add_sphere(empty, material_of(kind, "GGX", **inputs)[0])
     ball.select_set(True)
+    extension.api.enable_osl(empty)
     bpy.context.view_layer.objects.active = ball
     empty.cycles.blur_glossy = 1.0
     from importlib import import_module

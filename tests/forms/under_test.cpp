@@ -25,6 +25,33 @@ std::vector<ParamValues> cases_of(const ModelInfo& info) {
   return cases;
 }
 
+/// Facets that have another masking: their light beyond the model's is judged as a whole.
+bool exceeds_a_little(const std::string& name) { return name == "blinn" || name == "cook_torrance" || name == "ward"; }
+
+TEST(Under, ExceedsTheModelByALittleOfItsLightAtMost) {
+  measure::Random random(14);
+  for (const auto& [name, m] : models()) {
+    if (!exceeds_a_little(name)) continue;
+    for (const ParamValues& values : cases_of(m->info())) {
+      const measure::BoundModel bound = measure::bind_model(*m, values);
+      for (const double height : {1e-4, 0.03, 0.15, 0.4, 0.65, 0.9}) {
+        const Vec3<double> wo = direction(height, 2 * kPi * measure::uniform(random));
+        const ClosureSum<double> base = under(*m)->bound(m->info(), values, wo);
+        double all = 0, beyond = 0;
+        for (int i = 0; i < 4000; ++i) {
+          const Sample<double> s =
+              bound.brdf->sample(wo, {measure::uniform(random), measure::uniform(random), measure::uniform(random)});
+          if (!(s.pdf > 0)) continue;
+          const Rgb<double> f = bound.brdf->eval(s.wi, wo) * s.wi.z, b = evaluate(base, s.wi, wo);
+          all += std::max({f.r, f.g, f.b}) / s.pdf;
+          beyond += std::max({b.r - f.r, b.g - f.g, b.b - f.b, 0.0}) / s.pdf;
+        }
+        EXPECT_LE(beyond, 2e-4 * all) << bound.label << " height " << height;
+      }
+    }
+  }
+}
+
 TEST(Under, IsNowhereAboveTheModel) {
   measure::Random random(11);
   for (const auto& [name, m] : models()) {
@@ -40,6 +67,7 @@ TEST(Under, IsNowhereAboveTheModel) {
         const Rgb<double> f = bound.brdf->eval(wi, wo) * wi.z, b = evaluate(base, wi, wo);
         for (const Closure<double>& c : base)
           measure::require_value(c.weight, "weight of the base", bound.label, c.normal, wo);
+        if (exceeds_a_little(name)) continue;
         const auto above = [](double x, double y) { return y - x * (1 + 1e-7) - 1e-12; };
         const double most = std::max({above(f.r, b.r), above(f.g, b.g), above(f.b, b.b)});
         ASSERT_LE(most, 0) << bound.label << " wi " << wi.x << ' ' << wi.y << ' ' << wi.z << " wo " << wo.x << ' '
@@ -56,6 +84,9 @@ struct UnderRow {
 };
 const UnderRow kUnderRows[] = {{"ashikhmin_shirley", {"rs=0,0,0"}, 0.9},
                                {"ashikhmin_shirley", {"part=diffuse"}, 0.95},
+                               {"blinn", {}, 0.7},
+                               {"cook_torrance", {}, 0.55},
+                               {"cook_torrance", {"m=0.1"}, 0.9},
                                {"coupled", {}, 0.94},
                                {"eon", {}, 0.97},
                                {"eon", {"rho=1"}, 0.999999},
@@ -67,7 +98,9 @@ const UnderRow kUnderRows[] = {{"ashikhmin_shirley", {"rs=0,0,0"}, 0.9},
                                {"phong_material", {"ks=0", "kr=0"}, 0.999},
                                {"schlick", {}, 0.75},
                                {"schlick", {"rough=0.9"}, 0.7},
-                               {"schlick_double", {}, 0.9}};
+                               {"schlick_double", {}, 0.9},
+                               {"ward", {}, 0.8},
+                               {"ward", {"normalisation=duer", "ax=0.3"}, 0.7}};
 
 TEST(Under, CarriesWhatWasMeasured) {
   std::set<std::string> seen;
