@@ -8,6 +8,7 @@ import bpy
 
 from ..content import group_content
 from ..groups import bump_correction, nodes
+from ..nearest import native_bsdf
 from ..packs import pack
 from ..trees import animation, shader_trees, shader_values
 from .node_values import ANISOTROPY, KINDS, RATIO, has_own_animation
@@ -35,7 +36,8 @@ class PreparedPart:
     @property
     def known(self):
         """The values, with None for linked parameters."""
-        return self.values | dict.fromkeys(self.part.links)
+        linked = (*self.part.links, *(("f0", "tint") if self.part.flat else ()))
+        return self.values | dict.fromkeys(linked)
 
 
 class Replacement:
@@ -128,6 +130,8 @@ class Replacement:
                 tree.links.new(source, present[name])
         if prepared.part.again:
             tree.links.new(self._again(prepared.part.again), present["again"])
+        if prepared.part.flat:
+            self._brightest = self._flat(prepared.part.flat, present)
         for name, *law in prepared.part.widths:
             tree.links.new(self._follow(*law), present[name])
         return group
@@ -136,6 +140,14 @@ class Replacement:
         """The shader that replaces the node: its models, and the node's effects that they lack."""
         plan, links = self._plan, self._tree.links
         shader, *others = (group.outputs["BSDF"] for group in groups)
+        if plan.flat or plan.scale != 1:
+            # An input without a link is black.
+            dimmed = self._helper("ShaderNodeMixShader")
+            dimmed.inputs[0].default_value = plan.scale
+            if plan.flat:
+                links.new(self._brightest, dimmed.inputs[0])
+            links.new(shader, dimmed.inputs[2])
+            shader = dimmed.outputs[0]
         if plan.base:
             left = self._helper("ShaderNodeMixShader")
             links.new(self._rest(), left.inputs[0])
@@ -226,6 +238,29 @@ class Replacement:
         lost = self._operation("ShaderNodeMath", "SUBTRACT", mean, 1.0)
         left = vector("MULTIPLY_ADD", average, lost, 1.0)
         return vector("DIVIDE", vector("MULTIPLY", average, mean), left)
+
+    def _flat(self, color, present):
+        """Nodes for the values of a model that reflects a linked colour at all angles. Returns the
+        output with its brightest channel."""
+
+        def vector(operation, *operands):
+            return self._operation("ShaderNodeVectorMath", operation, *operands)
+
+        def math(operation, *operands):
+            return self._operation("ShaderNodeMath", operation, *operands)
+
+        source = self._source(color)
+        channels = self._helper("ShaderNodeSeparateColor")
+        self._tree.links.new(source, channels.inputs[0])
+        red, green, blue = channels.outputs
+        brightest = math("MAXIMUM", math("MAXIMUM", red, green), math("MAXIMUM", blue, 1e-6))
+        f0 = vector("DIVIDE", source, brightest)
+        # As native_bsdf.flat_tint().
+        edge = (1 - native_bsdf.TINTED) ** 5
+        tint = vector("DIVIDE", f0, vector("MULTIPLY_ADD", f0, 1 - edge, edge))
+        self._tree.links.new(f0, present["f0"])
+        self._tree.links.new(tint, present["tint"])
+        return brightest
 
     def _mix(self, name, first, second):
         mix = self._helper("ShaderNodeMixShader")
