@@ -16,7 +16,7 @@ from ..nearest import layer, native_bsdf
 from ..nearest.native_bsdf import Native
 from ..nearest.nearest_model import base_of, candidates, matte_of, nearest, scale_of, with_width
 from ..packs import device, pack
-from ..trees import shader_trees
+from ..trees import animation, shader_trees, shader_values
 from .filter_glossy import is_filtered
 from .instances import Instances
 from .node_values import (
@@ -103,6 +103,10 @@ class Plan(Part):
     #: that had an effect on the node and have none on its replacement.
     others: tuple = ()
     unused: tuple = ()
+    #: The sockets of the node that drivers read, where these go on reading the replaced node, and
+    #: the names of the materials, objects and so on that have such drivers.
+    read: tuple = ()
+    readers: tuple = ()
     #: The state of the node when the plan was made.
     seen: SeenNode | None = None
     #: Finds the input that makes the error large, and returns its name, or "".
@@ -159,6 +163,28 @@ class Plan(Part):
         return found | ({"Emission Color", "Emission Strength"} if self.glows else set())
 
     @property
+    def direct(self):
+        """{socket: (part, parameter)} of the node's sockets whose value becomes that of one
+        parameter, or {socket: None} if it becomes that of a node beside the models."""
+        found = {}
+        for part in self.parts:
+            for name, socket in part.links.items():
+                value = shader_values.constant(self.node.inputs[socket])
+                given = part.values.get(name)
+                known = None not in (value, given) and part.scale == 1
+                same = known and np.allclose(value, given, atol=1e-4)
+                found.setdefault(socket, []).append((part, name) if same else ())
+        for socket, used in (
+            ("Metallic", self.metal),
+            ("Alpha", self.transparent),
+            ("Emission Color", self.glows),
+            ("Emission Strength", self.glows),
+        ):
+            if used:
+                found.setdefault(socket, []).append(None)
+        return {name: at[0] for name, at in found.items() if len(at) == 1 and at[0] != ()}
+
+    @property
     def materials(self):
         """Every material that changes."""
         return (self.material, *self.others)
@@ -194,6 +220,13 @@ class Plan(Part):
         if self.unused:
             names = ", ".join(self.unused)
             said = say("{row}. Inputs of the group without effect: {names}", row=said, names=names)
+        if self.readers:
+            said = say(
+                "{row}. Drivers of {names} read its {sockets}, and go on reading the replaced node",
+                row=said,
+                names=", ".join(self.readers),
+                sockets=", ".join(self.read),
+            )
         return said
 
 
@@ -453,7 +486,7 @@ def plan(materials):
     """A Plan for each visible Diffuse, Glossy, Principled or Glass node of these materials, also of
     those in node groups, once each. Refused are other reflecting nodes, and group nodes with one of
     the four inside if their groups are linked from another file."""
-    plans, instances = {}, Instances()
+    plans, instances, readers = {}, Instances(), animation.Readers()
     for material in materials:
         for node in _convertible(material):
             place = node.as_pointer()
@@ -469,14 +502,29 @@ def plan(materials):
                 if node.bl_idname not in KINDS:
                     raise Refused(say("only Principled, Glossy, Diffuse and Glass nodes convert"))
                 withins = [instance.within for instance in instances.of(node)]
-                made = _plan_node(material, node, Inputs(node, withins))
+                inputs = Inputs(node, withins)
+                made = _plan_node(material, node, inputs)
                 _check_ranges(made.parts)
+                made = _with_readers(made, inputs, readers)
             except Refused as why:
                 made = Plan(material=material, node=node, refusal=why.args[0])
             else:
                 made = _of_group(made)
             plans[place] = replace(made, seen=SeenNode(material, node, instances))
     return list(plans.values())
+
+
+def _with_readers(made, inputs, readers):
+    """The Plan with what its row says of drivers that read the node's values, and that apply()
+    can't redirect."""
+    direct, read, names = made.direct, [], {}
+    for socket in made.node.inputs:
+        moves = socket.name in made.kept and inputs.moves(socket.name)
+        found = readers.stuck if moves or socket.name in direct else readers.of
+        if blocks := found(socket):
+            read.append(socket.name)
+            names |= dict.fromkeys(block.name for block in blocks)
+    return replace(made, read=tuple(read), readers=tuple(names))
 
 
 def _of_group(made):

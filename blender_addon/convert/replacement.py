@@ -21,9 +21,10 @@ CORRECTED = "brdfc_before_bump_map_correction"
 #: Custom property of the nodes that were added along with it: the name of the group node.
 HELPS = "brdfc_helps"
 #: Custom property of a node to which animation was moved: {name: identifier of the socket of the
-#: replaced node from which it comes}. The name is that of a model's parameter, or of a node's
-#: output.
+#: replaced node from which it comes}. The name is that of a model's parameter, of a node's output,
+#: or INPUT and the identifier of a node's input.
 MOVED = "brdfc_moved"
+INPUT = "input "
 
 
 @dataclass(frozen=True)
@@ -43,8 +44,12 @@ class PreparedPart:
 class Replacement:
     """Replaces the node of a Plan."""
 
-    def __init__(self, plan, parts):
+    def __init__(self, plan, parts, readers):
+        """`readers`: the animation.Readers of the file."""
         self._plan, self._node, self._tree = plan, plan.node, plan.node.id_data
+        self._readers, self._direct = readers, plan.direct
+        #: The sockets that have taken over the value of one of the replaced node, by its name.
+        self._given = {}
         self._animated = animation.animated_properties(plan.node)
         #: The nodes whose output has the animation of a socket of the replaced node, by its name.
         self._moving = {}
@@ -59,8 +64,13 @@ class Replacement:
             for helper in self._tree.nodes:
                 if helper.get(HELPS) == other.name:
                     helper[HELPS] = self._group.name
+        for prepared, group in zip(parts, groups, strict=True):
+            for name, parameter in prepared.part.links.items():
+                if self._direct.get(parameter) == (prepared.part, name):
+                    self._given[parameter] = nodes.sockets(group)[name]
         self._put(self._joined(groups))
         self._move_animation()
+        self._redirect_readers()
 
     def _put(self, shader):
         """Links the shader where the node was."""
@@ -101,7 +111,22 @@ class Replacement:
                 target = output
                 self._mark(source, output.name, socket)
             pairs.append((socket, target))
-        animation.move(pairs)
+        animation.move(pairs, self._readers)
+
+    def _redirect_readers(self):
+        """Has drivers that read a value of the node read it at its new place."""
+        pairs = []
+        for name, place in self._given.items():
+            socket = self._node.inputs[name]
+            if name in self._moving or place.is_linked or not self._readers.of(socket):
+                continue
+            if nodes.is_ours(place.node):
+                names = {s: parameter for parameter, s in nodes.sockets(place.node).items()}
+                self._mark(place.node, names[place], socket)
+            else:
+                self._mark(place.node, INPUT + place.identifier, socket)
+            pairs.append((socket, place))
+        self._readers.redirect(pairs)
 
     @staticmethod
     def _mark(node, name, socket):
@@ -276,6 +301,8 @@ class Replacement:
             return
         value = shader_values.constant(self._node.inputs[name])
         socket.default_value = (*value, 1.0) if isinstance(value, tuple) else value
+        if name in self._direct:
+            self._given[name] = socket
 
     def _follow(self, factor, power, low, high, stretched):
         """Nodes for a row of Part.widths."""
