@@ -44,6 +44,8 @@ _CLEAR = "fresnel_dielectric"
 _WHITE = 0.005
 #: A plan with a larger error is refused, unless another limit is given.
 LIMIT = 0.35
+#: The cause of a larger error is looked for, which takes up to seven fits, a second each.
+_LARGE = 0.05
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,7 @@ class Plan(Part):
         if self.refusal or self.error <= limit:
             return self
         of = {"model": self._label(), "percent": self._percent()}
-        if socket := self.cause():
+        if self.error > _LARGE and (socket := self.cause()):
             why = say(
                 "its nearest model, {model}, sends {percent} % of the light in other directions, "
                 "because of the node's {socket}",
@@ -519,6 +521,8 @@ def _with_readers(made, inputs, readers):
     can't redirect."""
     direct, read, names = made.direct, [], {}
     for socket in made.node.inputs:
+        if shader_trees.is_driven(socket):
+            continue  # its own value has no effect
         moves = socket.name in made.kept and inputs.moves(socket.name)
         found = readers.stuck if moves or socket.name in direct else readers.of
         if blocks := found(socket):

