@@ -11,7 +11,7 @@ from ..packs import pack
 from ..trees import animation
 from .instances import Instances
 from .node_values import KINDS
-from .replacement import BEFORE, CORRECTED, HELPS, MOVED, PreparedPart, Replacement
+from .replacement import BEFORE, CORRECTED, HELPS, INPUT, MOVED, PreparedPart, Replacement
 
 
 def apply(plans):
@@ -33,8 +33,9 @@ def apply(plans):
     except BaseException:
         nodes.remove_unused_groups(known)
         raise
+    readers = animation.Readers()
     for p, parts in zip(wanted, prepared, strict=True):
-        Replacement(p, parts)
+        Replacement(p, parts, readers)
     return len(wanted)
 
 
@@ -79,8 +80,9 @@ def restore(material):
     own = [group for group, _ in pairs if group.id_data == material.node_tree]
     corrected = [bool(group.get(CORRECTED, True)) for group in own]
     shared = dict.fromkeys(group.id_data for group, _ in pairs if group not in own)
+    readers = animation.Readers()
     for group, before in pairs:
-        _restore_node(group, before)
+        _restore_node(group, before, readers)
     if own:
         bump_correction.restore(material, all(corrected))
     for user in dict.fromkeys(user for tree in shared for user in nodes.users_of(tree)):
@@ -91,13 +93,17 @@ def restore(material):
 
 def _moved_back(node, before):
     """The sockets to which animation was moved, and those of the restored node."""
-    sockets = nodes.sockets(node) if nodes.is_ours(node) else dict(node.outputs.items())
+    if nodes.is_ours(node):
+        sockets = nodes.sockets(node)
+    else:
+        sockets = dict(node.outputs.items())
+        sockets |= {INPUT + socket.identifier: socket for socket in node.inputs}
     inputs = {socket.identifier: socket for socket in before.inputs}
     marks = node[MOVED].to_dict() if MOVED in node else {}
     return [(sockets[name], inputs[i]) for name, i in marks.items() if name in sockets]
 
 
-def _restore_node(group, before):
+def _restore_node(group, before, readers):
     tree, helpers = group.id_data, _helpers(group)
     if before is None:
         for model in [group, *filter(nodes.is_ours, helpers)]:
@@ -105,7 +111,8 @@ def _restore_node(group, before):
         for key in (BEFORE, CORRECTED, MOVED):
             group.pop(key, None)
         return
-    animation.move([pair for node in (group, *helpers) for pair in _moved_back(node, before)])
+    moved = [pair for node in (group, *helpers) for pair in _moved_back(node, before)]
+    animation.move(moved, readers)
     for link in _outgoing(group, helpers):
         target = link.to_socket
         tree.links.remove(link)

@@ -246,15 +246,14 @@ def given_of(node, inputs):
         given["multiscatter"] = distribution == "MULTI_GGX"
     if kind == "principled":
         check_off(inputs)
-        level, ior = inputs.value("Specular IOR Level"), inputs.value("IOR")
-        given["f0"] = min(((ior - 1) / (ior + 1)) ** 2 * 2 * level, 0.9)
         metallic = 0.5 if (known := inputs.mean("Metallic")) is None else known
         given["metallic"] = min(max(metallic, 0.0), 1.0)
+        if inputs.follows("Metallic") or given["metallic"] < 1:
+            given["f0"] = _f0_of(inputs)
+            roughness = inputs.value("Diffuse Roughness")
+            given["diffuse_roughness"] = min(max(roughness, 0.0), 1.0)
         tint = inputs.value("Specular Tint", (1.0, 1.0, 1.0))
-        if tint != (1, 1, 1) and (inputs.follows("Metallic") or given["metallic"] < 1):
-            raise Refused(say("it has a Specular Tint and is not all metal"))
-        given["tint"] = tuple(min(max(c, 0.0), 1.0) for c in tint)
-        given["diffuse_roughness"] = inputs.value("Diffuse Roughness")
+        given["tint"] = tuple(max(c, 0.0) for c in tint)
     if inputs.follows("Roughness"):
         roughnesses = ROUGHNESSES
     else:
@@ -265,6 +264,15 @@ def given_of(node, inputs):
     count = max(len(roughnesses), len(stretches))
     pairs = ((roughnesses * count)[:count], (stretches * count)[:count])
     return given, [{"roughness": r, "stretch": s} for r, s in zip(*pairs, strict=True)]
+
+
+def _f0_of(inputs):
+    """Reflectance of the interface of a Principled node at normal incidence."""
+    level, ior = inputs.value("Specular IOR Level"), inputs.value("IOR")
+    if ior < 1:
+        # As seen from within glass: beyond some angle everything is reflected.
+        raise Refused(say("its {socket} is below 1", socket=Sentence("IOR")))
+    return min(((ior - 1) / (ior + 1)) ** 2 * 2 * max(level, 0.0), 0.9)
 
 
 def is_mirror(roughnesses):
@@ -291,6 +299,8 @@ ANISOTROPY = {
 #: The square of the ratio of a Principled node's widths, across and along the tangent, is
 #: 1 + RATIO * anisotropy.
 RATIO = -0.9
+#: Cycles clamps the Anisotropy of a Glossy node to this, and to its negative.
+_MOST_GLOSSY = 0.99
 
 
 def _stretches(inputs, kind):
@@ -312,6 +322,7 @@ def _stretches(inputs, kind):
             raise Refused(said)
     if kind == "principled":
         return tuple(1 / (1 + RATIO * min(max(a, 0.0), 1.0)) for a in found)
+    found = tuple(min(max(a, -_MOST_GLOSSY), _MOST_GLOSSY) for a in found)
     return tuple((1 - a) ** 2 if a > 0 else 1 / (1 + a) ** 2 for a in found)
 
 

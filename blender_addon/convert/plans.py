@@ -3,7 +3,10 @@
 
 import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from .. import lamps
 from ..common import editable
@@ -11,13 +14,14 @@ from ..common.i18n import Sentence, in_percent, say
 from ..groups import nodes
 from ..nearest import layer, native_bsdf
 from ..nearest.native_bsdf import Native
-from ..nearest.nearest_model import base_of, nearest, with_width
+from ..nearest.nearest_model import base_of, candidates, matte_of, nearest, scale_of, with_width
 from ..packs import device, pack
-from ..trees import shader_trees
+from ..trees import animation, shader_trees, shader_values
 from .filter_glossy import is_filtered
 from .instances import Instances
 from .node_values import (
     ANISOTROPY,
+    GREY,
     KINDS,
     KNOWN_SOCKETS,
     STAYING,
@@ -34,8 +38,14 @@ from .seen_node import SeenNode
 
 #: A row of a plan names this many other materials at most.
 _MOST_NAMES = 6
+#: The model of smooth glass.
+_CLEAR = "fresnel_dielectric"
+#: Glass is white if no channel of its colour is farther from 1. Two surfaces double this.
+_WHITE = 0.005
 #: A plan with a larger error is refused, unless another limit is given.
 LIMIT = 0.35
+#: The cause of a larger error is looked for, which takes up to seven fits, a second each.
+_LARGE = 0.05
 
 
 @dataclass(frozen=True)
@@ -57,6 +67,10 @@ class Part:
     #: offset of the mean reflectance in the colour, the mean albedo of facets that reflect
     #: everything, as coefficients of roughness^j, and the socket of the colour.
     again: tuple = ()
+    #: A factor of the model's light; and the socket of the colour, if that is linked: its brightest
+    #: channel is the factor, and the model has the colour divided by it.
+    scale: float = 1.0
+    flat: str = ""
 
     @property
     def label(self):
@@ -91,8 +105,14 @@ class Plan(Part):
     #: that had an effect on the node and have none on its replacement.
     others: tuple = ()
     unused: tuple = ()
+    #: The sockets of the node that drivers read, where these go on reading the replaced node, and
+    #: the names of the materials, objects and so on that have such drivers.
+    read: tuple = ()
+    readers: tuple = ()
     #: The state of the node when the plan was made.
     seen: SeenNode | None = None
+    #: Finds the input that makes the error large, and returns its name, or "".
+    cause: Callable = field(default=str, repr=False, compare=False)
 
     @property
     def parts(self):
@@ -103,11 +123,19 @@ class Plan(Part):
         """The same plan, refused if its error exceeds a limit."""
         if self.refusal or self.error <= limit:
             return self
-        why = say(
-            "its nearest model, {model}, sends {percent} % of the light in other directions",
-            model=self._label(),
-            percent=self._percent(),
-        )
+        of = {"model": self._label(), "percent": self._percent()}
+        if self.error > _LARGE and (socket := self.cause()):
+            why = say(
+                "its nearest model, {model}, sends {percent} % of the light in other directions, "
+                "because of the node's {socket}",
+                **of,
+                socket=Sentence(socket),
+            )
+        else:
+            why = say(
+                "its nearest model, {model}, sends {percent} % of the light in other directions",
+                **of,
+            )
         return replace(self, refusal=why)
 
     def _label(self):
@@ -131,9 +159,32 @@ class Plan(Part):
         if self.anisotropic:
             found |= set(ANISOTROPY[KINDS[self.node.bl_idname]])
         found |= {part.again[3] for part in parts if part.again}
+        found |= {part.flat for part in parts if part.flat}
         found |= {"Metallic"} if self.metal else set()
         found |= {"Alpha"} if self.transparent else set()
         return found | ({"Emission Color", "Emission Strength"} if self.glows else set())
+
+    @property
+    def direct(self):
+        """{socket: (part, parameter)} of the node's sockets whose value becomes that of one
+        parameter, or {socket: None} if it becomes that of a node beside the models."""
+        found = {}
+        for part in self.parts:
+            for name, socket in part.links.items():
+                value = shader_values.constant(self.node.inputs[socket])
+                given = part.values.get(name)
+                known = None not in (value, given) and part.scale == 1
+                same = known and np.allclose(value, given, atol=1e-4)
+                found.setdefault(socket, []).append((part, name) if same else ())
+        for socket, used in (
+            ("Metallic", self.metal),
+            ("Alpha", self.transparent),
+            ("Emission Color", self.glows),
+            ("Emission Strength", self.glows),
+        ):
+            if used:
+                found.setdefault(socket, []).append(None)
+        return {name: at[0] for name, at in found.items() if len(at) == 1 and at[0] != ()}
 
     @property
     def materials(self):
@@ -171,6 +222,13 @@ class Plan(Part):
         if self.unused:
             names = ", ".join(self.unused)
             said = say("{row}. Inputs of the group without effect: {names}", row=said, names=names)
+        if self.readers:
+            said = say(
+                "{row}. Drivers of {names} read its {sockets}, and go on reading the replaced node",
+                row=said,
+                names=", ".join(self.readers),
+                sockets=", ".join(self.read),
+            )
         return said
 
 
@@ -183,8 +241,7 @@ def _plan_glass(material, node, inputs):
     if inputs.value("Thin Film Thickness") != 0:
         raise Refused(say("it has {what}", what=Sentence("Thin Film")))
     # Blender's glass tints both reflected and transmitted light.
-    error = sum(abs(1 - c) for c in color) / max(sum(color), 1e-6)
-    return _glass_of(material, node, inputs, error)
+    return _glass_of(material, node, inputs, "Color", [max(c, 0.0) for c in color])
 
 
 def _is_clear(inputs):
@@ -206,20 +263,46 @@ def _plan_clear(material, node, inputs):
         raise Refused(say("it has {what}", what=Sentence("Specular Tint")))
     # Such a node tints the transmitted light alone.
     tint = [min(max(c, 0.0), 1.0) ** 0.5 for c in inputs.value("Base Color")]
-    ior = inputs.mean("IOR") or 1.5
-    mirrored = native_bsdf.mean_dielectric(((ior - 1) / (ior + 1)) ** 2)
-    light = 3 * mirrored + (1 - mirrored) * sum(tint)
-    error = (1 - mirrored) * (3 - sum(tint)) / max(light, 1e-6)
     more = {"glows": glows(inputs), "transparent": is_transparent(inputs)}
-    return _glass_of(material, node, inputs, error, **more)
+    return _glass_of(material, node, inputs, "Base Color", tint, **more)
 
 
-def _glass_of(material, node, inputs, error, **more):
+def _glass_of(material, node, inputs, color, tint, **more):
+    """The Plan for smooth glass, which its socket `color` tints."""
+    if _CLEAR not in pack.model_names():
+        raise Refused(say("this extension lacks the models that are near: {models}", models=_CLEAR))
+    if any(abs(1 - c) > _WHITE for c in tint):
+        # Light passes two surfaces or more, and pictures of white glass show no colour at all: an
+        # error of one surface would be no warning.
+        said = say(
+            "its {socket} is not white, and {model} has no colour",
+            socket=Sentence(color),
+            model=pack.model(_CLEAR)["label"],
+        )
+        raise Refused(said)
     values = {} if inputs.follows("IOR") else {"ior": inputs.constant("IOR")}
-    links = {"ior": "IOR"}
-    part = Part("fresnel_dielectric", values, links)
-    found = {"material": material, "node": node, "error": error, "least_error": error}
+    part = Part(_CLEAR, values, {"ior": "IOR"})
+    found = {"material": material, "node": node, "error": 0.0, "least_error": 0.0}
     return Plan(**vars(part), **found, **more)
+
+
+def _check_ranges(parts):
+    """Raises Refused if a parameter would have a value that its model does not take."""
+    for part in parts:
+        for name, value in part.values.items():
+            parameter = pack.parameters(part.model).get(name, {})
+            low, high = parameter.get("min"), parameter.get("max")
+            if low is None or all(low <= c <= high for c in np.atleast_1d(value)):
+                continue
+            said = say(
+                "{parameter} of {model} would be {value}, and may be {low} to {high}",
+                parameter=parameter["label"],
+                model=part.label,
+                value=f"{np.max(value):g}",
+                low=f"{low:g}",
+                high=f"{high:g}",
+            )
+            raise Refused(said)
 
 
 @functools.cache
@@ -241,7 +324,7 @@ def _shown(without_osl):
 
 def _widths(inputs, native, width, factor):
     """Part.widths of a fit; `native`: the first Native of the fit."""
-    rough = inputs.reaches("Roughness")
+    rough = _follows_roughness(inputs, native)
     stretched = native.kind == "principled" and inputs.follows(ANISOTROPY["principled"][0])
     if not rough and not stretched:
         return
@@ -255,26 +338,75 @@ def _widths(inputs, native, width, factor):
             yield name, own, *law, -power if stretched else 0
 
 
-def _part(inputs, native, fit):
-    """The Part for a Fit to a node; `native`: the first Native of the fit."""
-    color = color_of(native.kind)
+def _follows_roughness(inputs, native):
+    """Whether a link or an animation controls the roughness of a node that is taken for `native`.
+    The base of a Principled node has another one, which is constant."""
+    is_base = native.kind == "diffuse" and "Base Color" in inputs
+    return not is_base and inputs.reaches("Roughness")
+
+
+def _part(inputs, native, fit, color):
+    """The Part for a Fit to a node; `native`: the first Native of the fit; `color`: the socket of
+    its colour."""
     candidate, factor, width = fit.candidate, fit.factor, fit.candidate.width
     links = {name: color if s == "Color" else s for name, s in candidate.links.items()}
     values = with_width(candidate, native, factor)
     widths = tuple(_widths(inputs, native, width, factor)) if width else ()
-    base, below = None, base_of(candidate, native, inputs.reaches("Roughness"))
+    rough = _follows_roughness(inputs, native)
+    base, below = None, base_of(candidate, native, rough)
     if below:
         linked = {name: color for name in candidate.base.candidate.links}
         base = Part(below.model, below.values, linked)
     again = ()
-    if "again" in values and (inputs.reaches("Roughness") or inputs.reaches(color)):
+    if "again" in values and (rough or inputs.reaches(color)):
         slope, offset = (tuple(law.tolist()) for law in native_bsdf.facet_law(native))
         mean = layer.mean_albedo()
-        if not inputs.reaches("Roughness"):
+        if not rough:
             mean = (float(native_bsdf.mean_facet_albedo(native.alpha)),)
         again = slope, offset, mean, color
     rest = below.rest if below else ()
-    return Part(candidate.model, values, links, widths, base, rest, again)
+    scale, flat = scale_of(candidate, native), ""
+    if candidate.is_flat and inputs.reaches(color):
+        links, flat = {}, color
+    return Part(candidate.model, values, links, widths, base, rest, again, scale, flat)
+
+
+def _lacking(natives, colors):
+    """Why no model is near: a sentence."""
+    if fit := nearest(natives, colors, False, _shown(False)):
+        return say(
+            "its nearest model, {model}, which sends {percent} % of the light in other directions, "
+            "needs Open Shading Language for its values",
+            model=pack.model(fit.candidate.model)["label"],
+            percent=in_percent(max(error for _, error in fit.found)),
+        )
+    models = dict.fromkeys(c.model for c in candidates(natives[0]))
+    return say("this extension lacks the models that are near: {models}", models=", ".join(models))
+
+
+#: Values to which those of a node are changed, one after the other, to find what makes an error
+#: large: as in a new node, but for the colour; and the socket with this value.
+_PLAIN = {
+    "color": (GREY, ""),
+    "tint": ((1.0, 1.0, 1.0), "Specular Tint"),
+    "diffuse_roughness": (0.0, "Diffuse Roughness"),
+    "stretch": (1.0, "Anisotropic"),
+    "f0": (0.04, "IOR"),
+    "metallic": (0.0, "Metallic"),
+    "roughness": (0.5, "Roughness"),
+}
+
+
+def _cause(given, looks, error, error_without):
+    """The name of the socket that makes an error large: as in a new node, it would at least halve
+    the error. "" if there is none."""
+    new = _PLAIN | ({"roughness": (0.0, "Roughness")} if given["kind"] == "diffuse" else {})
+    for name, (value, socket) in new.items():
+        had = {given.get(name, value), *(look.get(name, value) for look in looks)}
+        if had != {value} and error_without(**{name: value}) < 0.5 * error:
+            is_turn = name == "stretch" and given["kind"] == "glossy"
+            return ANISOTROPY["glossy"][0] if is_turn else socket or color_of(given["kind"])
+    return ""
 
 
 def _plan_node(material, node, inputs):
@@ -286,14 +418,28 @@ def _plan_node(material, node, inputs):
     color = color_of(given["kind"])
     _, colors = inputs.colors(color)
 
+    has = _shown(device.lacks_osl(lamps.current_scene()))
+
+    def looked(**other):
+        """The Natives of the node with these values changed."""
+        found = tuple(Native(**given | look | other) for look in looks)
+        # Without a highlight, roughness and anisotropy of a Principled node have no effect.
+        is_base = found[0].is_matte and found[0].kind == "principled"
+        return (matte_of(found[0]),) if is_base else found
+
     def near(**other):
         """The Part for the node with these values changed, and its Fit."""
-        looked = tuple(Native(**given | other, **look) for look in looks)
-        has = _shown(device.lacks_osl(lamps.current_scene()))
-        fit = nearest(looked, colors, inputs.reaches(color), has)
+        natives = looked(**other)
+        fit = nearest(natives, colors, inputs.reaches(color), has)
         if fit is None:
-            raise Refused(say("this extension has no model that is near"))
-        return _part(inputs, looked[0], fit), fit
+            raise Refused(_lacking(natives, colors))
+        return _part(inputs, natives[0], fit, color), fit
+
+    def error_without(**other):
+        """The error of one model for the node with these values changed."""
+        shades = (other["color"],) if "color" in other else colors
+        fit = nearest(looked(**other), shades, False, has)
+        return math.inf if fit is None else max(error for _, error in fit.found)
 
     def plan(part, fits, errors, **more):
         if inputs.follows(color) and any(fit.lost for fit in fits):
@@ -307,7 +453,8 @@ def _plan_node(material, node, inputs):
         more |= {"error": max(errors), "least_error": min(errors)}
         more |= {"anisotropic": any(look["stretch"] != 1 for look in looks)}
         more |= {"filtered": any(is_filtered(Native(**given, **look)) for look in looks)}
-        return Plan(**vars(part), **more)
+        cause = functools.cache(functools.partial(_cause, given, looks, max(errors), error_without))
+        return Plan(**vars(part), **more, cause=cause)
 
     if given["kind"] != "principled":
         part, fit = near()
@@ -341,7 +488,7 @@ def plan(materials):
     """A Plan for each visible Diffuse, Glossy, Principled or Glass node of these materials, also of
     those in node groups, once each. Refused are other reflecting nodes, and group nodes with one of
     the four inside if their groups are linked from another file."""
-    plans, instances = {}, Instances()
+    plans, instances, readers = {}, Instances(), animation.Readers()
     for material in materials:
         for node in _convertible(material):
             place = node.as_pointer()
@@ -355,15 +502,33 @@ def plan(materials):
                 if getattr(node, "node_tree", None) is not None:
                     raise Refused(editable.refusal(node.node_tree))
                 if node.bl_idname not in KINDS:
-                    raise Refused(say("this extension has no model that is near"))
+                    raise Refused(say("only Principled, Glossy, Diffuse and Glass nodes convert"))
                 withins = [instance.within for instance in instances.of(node)]
-                made = _plan_node(material, node, Inputs(node, withins))
+                inputs = Inputs(node, withins)
+                made = _plan_node(material, node, inputs)
+                _check_ranges(made.parts)
+                made = _with_readers(made, inputs, readers)
             except Refused as why:
                 made = Plan(material=material, node=node, refusal=why.args[0])
             else:
                 made = _of_group(made)
             plans[place] = replace(made, seen=SeenNode(material, node, instances))
     return list(plans.values())
+
+
+def _with_readers(made, inputs, readers):
+    """The Plan with what its row says of drivers that read the node's values, and that apply()
+    can't redirect."""
+    direct, read, names = made.direct, [], {}
+    for socket in made.node.inputs:
+        if shader_trees.is_driven(socket):
+            continue  # its own value has no effect
+        moves = socket.name in made.kept and inputs.moves(socket.name)
+        found = readers.stuck if moves or socket.name in direct else readers.of
+        if blocks := found(socket):
+            read.append(socket.name)
+            names |= dict.fromkeys(block.name for block in blocks)
+    return replace(made, read=tuple(read), readers=tuple(names))
 
 
 def _of_group(made):

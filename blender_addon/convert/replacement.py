@@ -8,6 +8,7 @@ import bpy
 
 from ..content import group_content
 from ..groups import bump_correction, nodes
+from ..nearest import native_bsdf
 from ..packs import pack
 from ..trees import animation, shader_trees, shader_values
 from .node_values import ANISOTROPY, KINDS, RATIO, has_own_animation
@@ -20,9 +21,10 @@ CORRECTED = "brdfc_before_bump_map_correction"
 #: Custom property of the nodes that were added along with it: the name of the group node.
 HELPS = "brdfc_helps"
 #: Custom property of a node to which animation was moved: {name: identifier of the socket of the
-#: replaced node from which it comes}. The name is that of a model's parameter, or of a node's
-#: output.
+#: replaced node from which it comes}. The name is that of a model's parameter, of a node's output,
+#: or INPUT and the identifier of a node's input.
 MOVED = "brdfc_moved"
+INPUT = "input "
 
 
 @dataclass(frozen=True)
@@ -35,14 +37,19 @@ class PreparedPart:
     @property
     def known(self):
         """The values, with None for linked parameters."""
-        return self.values | dict.fromkeys(self.part.links)
+        linked = (*self.part.links, *(("f0", "tint") if self.part.flat else ()))
+        return self.values | dict.fromkeys(linked)
 
 
 class Replacement:
     """Replaces the node of a Plan."""
 
-    def __init__(self, plan, parts):
+    def __init__(self, plan, parts, readers):
+        """`readers`: the animation.Readers of the file."""
         self._plan, self._node, self._tree = plan, plan.node, plan.node.id_data
+        self._readers, self._direct = readers, plan.direct
+        #: The sockets that have taken over the value of one of the replaced node, by its name.
+        self._given = {}
         self._animated = animation.animated_properties(plan.node)
         #: The nodes whose output has the animation of a socket of the replaced node, by its name.
         self._moving = {}
@@ -57,8 +64,13 @@ class Replacement:
             for helper in self._tree.nodes:
                 if helper.get(HELPS) == other.name:
                     helper[HELPS] = self._group.name
+        for prepared, group in zip(parts, groups, strict=True):
+            for name, parameter in prepared.part.links.items():
+                if self._direct.get(parameter) == (prepared.part, name):
+                    self._given[parameter] = nodes.sockets(group)[name]
         self._put(self._joined(groups))
         self._move_animation()
+        self._redirect_readers()
 
     def _put(self, shader):
         """Links the shader where the node was."""
@@ -99,7 +111,22 @@ class Replacement:
                 target = output
                 self._mark(source, output.name, socket)
             pairs.append((socket, target))
-        animation.move(pairs)
+        animation.move(pairs, self._readers)
+
+    def _redirect_readers(self):
+        """Has drivers that read a value of the node read it at its new place."""
+        pairs = []
+        for name, place in self._given.items():
+            socket = self._node.inputs[name]
+            if name in self._moving or place.is_linked or not self._readers.of(socket):
+                continue
+            if nodes.is_ours(place.node):
+                names = {s: parameter for parameter, s in nodes.sockets(place.node).items()}
+                self._mark(place.node, names[place], socket)
+            else:
+                self._mark(place.node, INPUT + place.identifier, socket)
+            pairs.append((socket, place))
+        self._readers.redirect(pairs)
 
     @staticmethod
     def _mark(node, name, socket):
@@ -128,6 +155,8 @@ class Replacement:
                 tree.links.new(source, present[name])
         if prepared.part.again:
             tree.links.new(self._again(prepared.part.again), present["again"])
+        if prepared.part.flat:
+            self._brightest = self._flat(prepared.part.flat, present)
         for name, *law in prepared.part.widths:
             tree.links.new(self._follow(*law), present[name])
         return group
@@ -136,6 +165,14 @@ class Replacement:
         """The shader that replaces the node: its models, and the node's effects that they lack."""
         plan, links = self._plan, self._tree.links
         shader, *others = (group.outputs["BSDF"] for group in groups)
+        if plan.flat or plan.scale != 1:
+            # An input without a link is black.
+            dimmed = self._helper("ShaderNodeMixShader")
+            dimmed.inputs[0].default_value = plan.scale
+            if plan.flat:
+                links.new(self._brightest, dimmed.inputs[0])
+            links.new(shader, dimmed.inputs[2])
+            shader = dimmed.outputs[0]
         if plan.base:
             left = self._helper("ShaderNodeMixShader")
             links.new(self._rest(), left.inputs[0])
@@ -227,6 +264,29 @@ class Replacement:
         left = vector("MULTIPLY_ADD", average, lost, 1.0)
         return vector("DIVIDE", vector("MULTIPLY", average, mean), left)
 
+    def _flat(self, color, present):
+        """Nodes for the values of a model that reflects a linked colour at all angles. Returns the
+        output with its brightest channel."""
+
+        def vector(operation, *operands):
+            return self._operation("ShaderNodeVectorMath", operation, *operands)
+
+        def math(operation, *operands):
+            return self._operation("ShaderNodeMath", operation, *operands)
+
+        source = self._source(color)
+        channels = self._helper("ShaderNodeSeparateColor")
+        self._tree.links.new(source, channels.inputs[0])
+        red, green, blue = channels.outputs
+        brightest = math("MAXIMUM", math("MAXIMUM", red, green), math("MAXIMUM", blue, 1e-6))
+        f0 = vector("DIVIDE", source, brightest)
+        # As native_bsdf.flat_tint().
+        edge = (1 - native_bsdf.TINTED) ** 5
+        tint = vector("DIVIDE", f0, vector("MULTIPLY_ADD", f0, 1 - edge, edge))
+        self._tree.links.new(f0, present["f0"])
+        self._tree.links.new(tint, present["tint"])
+        return brightest
+
     def _mix(self, name, first, second):
         mix = self._helper("ShaderNodeMixShader")
         self._give(mix.inputs[0], name)
@@ -241,6 +301,8 @@ class Replacement:
             return
         value = shader_values.constant(self._node.inputs[name])
         socket.default_value = (*value, 1.0) if isinstance(value, tuple) else value
+        if name in self._direct:
+            self._given[name] = socket
 
     def _follow(self, factor, power, low, high, stretched):
         """Nodes for a row of Part.widths."""

@@ -19,13 +19,15 @@ _DEGREE, _DEGREE_ROUGHNESS = 5, 4
 
 
 @functools.lru_cache(maxsize=64)
-def rest(f0, multiscatter, roughness=None):
+def rest(f0, tint, multiscatter, roughness=None):
     """The light that the layer leaves to its base, seen from a view, as Cycles computes it: a
     polynomial. Returns ((c00, c01, ...), (c10, ...), ...), the coefficients of (1 - cos)^i
-    roughness^j. `roughness`: the only one that matters; None: all of them."""
+    roughness^j. `tint`: the largest channel of the tint of f0. `roughness`: the only one that
+    matters; None: all of them."""
     roughnesses = _ROUGHNESSES if roughness is None else np.array([roughness])
     views = np.stack([np.sqrt(1 - _COSINES**2), 0 * _COSINES, _COSINES], -1)
     plastic = native_bsdf.Native("principled", (1.0, 1.0, 1.0), f0=f0, multiscatter=multiscatter)
+    plastic = replace(plastic, tint=(tint,) * 3)
     nodes = [replace(plastic, roughness=r) for r in roughnesses]
     left = 1 - np.stack([native_bsdf.view_terms(node, views).taken for node in nodes])
     degree = _DEGREE_ROUGHNESS if roughness is None else 0
@@ -58,12 +60,12 @@ def rest_at(coefficients, cosine, roughness):
 
 
 @functools.lru_cache(maxsize=64)
-def schlick_like(f0):
+def schlick_like(f0, tint=1.0):
     """The reflectance and the tint of `microfacet` whose Fresnel term is nearest to that of a
-    dielectric: its relative error is the smallest, on average over cosines from 0.2."""
+    dielectric with a tint: its relative error is the smallest, on average over cosines from 0.2."""
     c = np.linspace(0.2, 1, 33)
-    wanted = native_bsdf.dielectric(f0, c)
-    f0s = (f0 * np.linspace(1, 1.3, 31))[:, None, None]
+    wanted = native_bsdf.tinted_dielectric(native_bsdf.dielectric(f0, c), f0, (tint,))[:, 0]
+    f0s = (f0 * tint * np.linspace(0.7, 1.3, 61))[:, None, None]
     tints = np.linspace(0.7, 1, 31)[:, None]
     tinted = native_bsdf.TINTED
     strongest = c * (1 - c) ** 6 / (tinted * (1 - tinted) ** 6)

@@ -41,7 +41,8 @@ class Native:
     f0: float = 0.04
     #: Roughness of the diffuse base of a Principled node.
     diffuse_roughness: float = 0.0
-    #: Specular Tint of a Principled node: a factor of a metal's reflectance at 82 degrees.
+    #: Specular Tint of a Principled node: a factor of a metal's reflectance at 82 degrees, and of a
+    #: dielectric's at normal incidence.
     tint: tuple = (1.0, 1.0, 1.0)
 
     @property
@@ -55,6 +56,12 @@ class Native:
         """The equal roughnesses by which Cycles looks up albedos."""
         mean = (self.alpha[0] * self.alpha[1]) ** 0.5
         return mean, mean
+
+    @property
+    def is_matte(self):
+        """Whether it has no highlight."""
+        plastic = self.kind == "principled" and self.metallic == 0
+        return self.kind == "diffuse" or plastic and self.f0 == 0
 
     @property
     def is_mirror(self):
@@ -75,6 +82,23 @@ def dielectric(f0, cosine):
 def mean_dielectric(f0):
     """The cosine-weighted mean of dielectric() over the hemisphere."""
     return float((dielectric(f0, _MU) * _SHARE).sum())
+
+
+def tinted_dielectric(reflectance, f0, tint):
+    """A reflectance of dielectric() or mean_dielectric() where that at normal incidence has a tint:
+    (..., n) for n tints."""
+    tinted = f0 * np.asarray(tint, np.float64)
+    return tinted + (1 - tinted) * (np.asarray(reflectance)[..., None] - f0) / (1 - f0)
+
+
+def gloss_fresnel(native, cosine):
+    """Reflectance (..., 3) of the interface of a Principled node."""
+    return tinted_dielectric(dielectric(native.f0, cosine), native.f0, native.tint)
+
+
+def mean_gloss_fresnel(native):
+    """The cosine-weighted mean of gloss_fresnel() over the hemisphere."""
+    return tinted_dielectric(mean_dielectric(native.f0), native.f0, native.tint)
 
 
 def _clamp_to_one(color):
@@ -200,7 +224,7 @@ def facet_law(native):
     if native.kind == "glossy":
         return np.ones(3), np.zeros(3)
     if native.metallic == 0:
-        return np.zeros(3), np.full(3, mean_dielectric(native.f0))
+        return np.zeros(3), mean_gloss_fresnel(native)
     black, white = (mean_metal_fresnel(replace(native, color=c)) for c in ((0.0,) * 3, (1.0,) * 3))
     return white - black, black
 
@@ -251,10 +275,10 @@ def matte(wi, wo, color, roughness):
 class ViewTerms(NamedTuple):
     """The quantities of Glossy and Principled that depend on the view alone, for each view."""
 
-    #: Fraction of light that the dielectric interface keeps from the base, (k,).
+    #: Fraction of light that the dielectric interface keeps from the base, (k,): that of the
+    #: channel of which it keeps most.
     taken: np.ndarray
-    #: Factors of multiple scattering between microfacets of the interface, (k,), and of metal, (k,
-    #: 3).
+    #: Factors of multiple scattering between microfacets of the interface and of metal, (k, 3).
     gloss: np.ndarray
     metal: np.ndarray
 
@@ -265,22 +289,22 @@ class ViewTerms(NamedTuple):
 
 def view_terms(native, each):
     """The ViewTerms of views (k, 3)."""
-    none = ViewTerms(np.zeros(len(each)), np.ones(len(each)), np.ones((len(each), 3)))
+    none = ViewTerms(np.zeros(len(each)), *np.ones((2, len(each), 3)))
     if native.is_mirror:
-        return none._replace(taken=dielectric(native.f0, each[:, 2]))
+        return none._replace(taken=gloss_fresnel(native, each[:, 2]).max(-1))
     color = np.asarray(native.color, np.float64)
     if native.kind == "glossy":
         return none._replace(metal=_multiscatter(each, native, color))
     terms = none
     if native.metallic < 1:
-        taken = facet_albedo(each, native.mean_alpha, False, lambda c: dielectric(native.f0, c))
+        taken = facet_albedo(each, native.mean_alpha, False, lambda c: gloss_fresnel(native, c))
         if native.multiscatter:
-            gloss = _multiscatter(each, native, mean_dielectric(native.f0))[:, 0]
-            terms = terms._replace(taken=taken * gloss, gloss=gloss)
+            gloss = _multiscatter(each, native, mean_gloss_fresnel(native))
+            terms = terms._replace(taken=(taken * gloss).max(-1), gloss=gloss)
         else:
             # Cycles keeps from the base what facets would reflect if they hid no light.
             whole = facet_albedo(each, native.mean_alpha, False)
-            terms = terms._replace(taken=taken / whole)
+            terms = terms._replace(taken=taken.max(-1) / whole)
     if native.metallic > 0:
         terms = terms._replace(metal=_multiscatter(each, native, mean_metal_fresnel(native)))
     return terms
@@ -304,7 +328,7 @@ def f_cos_of_view(native, wi, wo, terms):
         return color * lobe * terms.metal
     cosine = (wo * half(wi, wo)).sum(-1)
     base = matte(wi, wo, color, native.diffuse_roughness) * (1 - terms.taken)[:, None]
-    plastic = base + lobe * (dielectric(native.f0, cosine) * terms.gloss)[:, None]
+    plastic = base + lobe * gloss_fresnel(native, cosine) * terms.gloss
     metal = lobe * metal_fresnel(native, cosine) * terms.metal
     return (1 - native.metallic) * plastic + native.metallic * metal
 
@@ -332,5 +356,5 @@ def mirror(native, wo):
         return np.zeros((len(wo), 3))
     if native.kind == "glossy":
         return np.broadcast_to(np.asarray(native.color, np.float64), (len(wo), 3))
-    plastic = dielectric(native.f0, wo[:, 2])[:, None]
+    plastic = gloss_fresnel(native, wo[:, 2])
     return (1 - native.metallic) * plastic + native.metallic * metal_fresnel(native, wo[:, 2])

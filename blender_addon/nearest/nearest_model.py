@@ -58,8 +58,9 @@ class Candidate:
     #: The Fit of the matte base beneath this glossy layer, which has the light that the layer's
     #: albedo leaves.
     base: "Fit | None" = None
-    #: Whether parameters that no link sets depend on the node's colour.
-    of_color: bool = False
+    #: Whether it reflects the same at all angles: its values are for the node's colour divided by
+    #: scale_of(), by which a Mix Shader multiplies its light.
+    is_flat: bool = False
 
     @property
     def is_colored(self):
@@ -83,12 +84,13 @@ def base_of(candidate, native, follows=False):
     if candidate.base is None:
         return None
     fit = candidate.base
-    values = with_width(fit.candidate, _matte_of(native), fit.factor)
-    rest = layer.rest(native.f0, native.multiscatter, None if follows else native.roughness)
+    values = with_width(fit.candidate, matte_of(native), fit.factor)
+    roughness = None if follows else native.roughness
+    rest = layer.rest(native.f0, max(native.tint), native.multiscatter, roughness)
     return Base(fit.candidate.model, values, rest)
 
 
-def _matte_of(native):
+def matte_of(native):
     """The base of a Principled node."""
     return native_bsdf.Native("diffuse", native.color, native.diffuse_roughness)
 
@@ -100,7 +102,8 @@ def _grey(color):
 def _mixed(native):
     """Reflectance at normal incidence of the mix of dielectric and metal."""
     m = native.metallic
-    return tuple((1 - m) * native.f0 + m * c for c in native.color)
+    both = zip(native.color, native.tint, strict=True)
+    return tuple((1 - m) * min(native.f0 * t, 1.0) + m * c for c, t in both)
 
 
 def _base(native):
@@ -109,6 +112,25 @@ def _base(native):
     share = (1 - native.metallic) * (1 - native.f0)
     mixed = zip(native.color, _mixed(native), strict=True)
     return tuple(min(share * c / max(1 - m, 1e-6), 1.0) for c, m in mixed)
+
+
+def _edge_tint(native):
+    """The tint of a metal, which Cycles clamps."""
+    return tuple(min(t, 1.0) for t in native.tint)
+
+
+def scale_of(candidate, native):
+    """The factor by which the light of a candidate for a node is multiplied."""
+    return min(max(*native.color, 1e-6), 1.0) if candidate.is_flat else 1.0
+
+
+def _flat(native):
+    """Values of `microfacet` by which it reflects the same at normal incidence and at 82 degrees,
+    and nearly the same between and beyond. Bright colours do so better: the brightest channel is 1.
+    """
+    brightest = scale_of(_FLAT, native)
+    color = tuple(min(c / brightest, 1.0) for c in native.color)
+    return {"f0": color, "tint": native_bsdf.flat_tint(color), **_distribution(native)}
 
 
 def _distribution(native):
@@ -132,7 +154,7 @@ _COLORED = (
     ),
     Candidate(
         "microfacet",
-        lambda n: {"f0": n.color, "tint": n.tint, **_distribution(n)},
+        lambda n: {"f0": n.color, "tint": _edge_tint(n), **_distribution(n)},
         _FACETS,
         {"f0": "Color"},
     ),
@@ -148,19 +170,8 @@ _COLORED = (
         "modified_phong", lambda n: {"ks": n.color}, Width("e", **_EXPONENT), {"ks": "Color"}
     ),
 )
-#: A Glossy node reflects the same at every angle. At 82 degrees, where `tint` counts most, so does
-#: this.
-_FLAT = Candidate(
-    "microfacet",
-    lambda n: {
-        "f0": n.color,
-        "tint": native_bsdf.flat_tint(n.color),
-        **_distribution(n),
-    },
-    _FACETS,
-    {"f0": "Color"},
-    of_color=True,
-)
+#: For a Glossy node, which reflects the same at every angle.
+_FLAT = Candidate("microfacet", _flat, _FACETS, {"f0": "Color"}, is_flat=True)
 _MATTE = (
     Candidate("lambert", lambda n: {"rho": n.color}, None, {"rho": "Color"}),
     Candidate("eon", lambda n: {"rho": n.color}, Width("r", 1e-3, 1.0, 1), {"rho": "Color"}),
@@ -184,7 +195,7 @@ _METAL_MIRROR = Candidate("schlick", lambda n: {"r": n.color, "rough": 0.0}, lin
 #: Facets as steep as the narrowest lobe by which directions are sampled.
 _TINTED_MIRROR = Candidate(
     "microfacet",
-    lambda n: {"f0": n.color, "tint": n.tint, "ax": _NARROWEST, "ay": _NARROWEST},
+    lambda n: {"f0": n.color, "tint": _edge_tint(n), "ax": _NARROWEST, "ay": _NARROWEST},
     links={"f0": "Color"},
 )
 _COATED = Candidate("coupled", lambda n: {"r0": n.f0, "rm": n.color}, None, {"rm": "Color"})
@@ -212,11 +223,11 @@ def _polished(links, sharp=False):
 
 def _layered(native, has):
     """A glossy layer of microfacets over the nearest matte base."""
-    base = nearest((_matte_of(native),), (), False, has)
+    base = nearest((matte_of(native),), (), False, has)
     if base is None:
         return ()
-    f0, tint = layer.schlick_like(native.f0)
-    values = {"f0": (f0,) * 3, "tint": (tint,) * 3}
+    f0, tint = zip(*(layer.schlick_like(native.f0, t) for t in native.tint), strict=True)
+    values = {"f0": f0, "tint": tint}
     return (Candidate("microfacet", lambda n: values | _distribution(n), _FACETS, base=base),)
 
 
@@ -227,12 +238,13 @@ def candidates(native, has=lambda model, values: True):
 
 
 def _candidates(native, has):
-    if native.kind == "diffuse" or (native.kind == "principled" and _mixed(native) == (0, 0, 0)):
+    if native.is_matte:
         return _MATTE
     if native.is_mirror and native.kind == "glossy":
         return (*_MIRRORS, _METAL_MIRROR)
     if native.is_mirror and native.metallic == 0:
-        return (_COATED,)
+        tinted = native.tint != (1, 1, 1)
+        return (_COATED, *(_polished({"rd": "Color"}, sharp=True) if tinted else ()))
     if native.is_mirror:
         if native.tint != (1, 1, 1):
             return (_METAL_MIRROR, _TINTED_MIRROR)
@@ -342,44 +354,44 @@ class Target:
         self.mirror = native_bsdf.mirror(native, self.at.each)
         self.total = self.at.light(self.f_cos) + self.mirror
 
-    def _f_cos(self, model, values, base, which=slice(None)):
-        """f cos of a model over a Base, or None, at some of the directions."""
+    def _f_cos(self, model, values, base, scale, which=slice(None)):
+        """f cos of a model times `scale` over a Base, or None, at some of the directions."""
         from ..brdfc import model as formulas
 
         wi, wo = self.at.wi[which], self.at.wo[which]
-        f = formulas(model).eval(wi, wo, **values)
+        f = formulas(model).eval(wi, wo, **values) * scale
         if base:
             left = layer.rest_at(base.rest, self.at.each[:, 2], self.native.roughness)
             below = formulas(base.model).eval(wi, wo, **base.values)
             f = f + below * left[self.at.which[which], None]
         return f * wi[:, 2:]
 
-    def _differences(self, model, values, base):
+    def _differences(self, model, values, base, scale):
         """Model minus node: of f cos, and of the mirror reflection's weight."""
         from ..brdfc import model as formulas
 
-        mirror = formulas(model).mirror(self.at.each, **values)
-        return self._f_cos(model, values, base) - self.f_cos, mirror - self.mirror
+        mirror = formulas(model).mirror(self.at.each, **values) * scale
+        return self._f_cos(model, values, base, scale) - self.f_cos, mirror - self.mirror
 
     def _mean(self, differences):
         return float((differences.sum(1) / np.maximum(self.total.sum(1), 1e-9)).mean())
 
-    def misplaced(self, model, values, base=None):
-        """Fraction of the light of point lamps that a model over a Base misplaces, mean over views
-        and channels."""
-        f_cos, mirror = self._differences(model, values, base)
+    def misplaced(self, model, values, base=None, scale=1.0):
+        """Fraction of the light of point lamps that a model times `scale` over a Base misplaces,
+        mean over views and channels."""
+        f_cos, mirror = self._differences(model, values, base, scale)
         return self._mean(self.at.light(np.abs(f_cos)) + np.abs(mirror))
 
-    def roughly_misplaced(self, model, values, base=None):
+    def roughly_misplaced(self, model, values, base=None, scale=1.0):
         """The same from a subset of the directions, in arbitrary units, to compare widths that are
         far apart."""
         few = slice(None, None, _ROUGH_STRIDE)
-        off = np.abs(self._f_cos(model, values, base, few) - self.f_cos[few])
+        off = np.abs(self._f_cos(model, values, base, scale, few) - self.f_cos[few])
         return float((off.sum(1) * self.at.weight[few]).sum())
 
-    def error(self, model, values, base=None):
+    def error(self, model, values, base=None, scale=1.0):
         """The same under lamps as wide as windows, from all sides: the error that pictures show."""
-        differences = self._differences(model, values, base)
+        differences = self._differences(model, values, base, scale)
         return self._mean(np.abs(self.at.light_of_lamps(*differences)).sum(1))
 
 
@@ -426,10 +438,8 @@ def nearest(natives, colors, colored, has):
             candidate.width and candidate.width.across
         ):
             continue
-        if colored and candidate.of_color:
-            continue
         lost = colored and not candidate.is_colored
-        key = candidate.model, candidate.width
+        key = candidate.model, candidate.width, candidate.is_flat
         if key not in roughly:
             roughly[key] = _rough_width(candidate, targets)
         between = roughly[key]
@@ -440,7 +450,7 @@ def nearest(natives, colors, colored, has):
     best, fits = min(f[:2] for f in found), []
     for lost, error, between, candidate in found:
         if lost == best[0] and error <= _CANDIDATE_MARGIN * best[1]:
-            key = candidate.model, candidate.width
+            key = candidate.model, candidate.width, candidate.is_flat
             if key not in closely:
                 closely[key] = _factor(candidate, targets, between)
             error = _mean(Target.error, candidate, targets, closely[key])
@@ -473,6 +483,7 @@ def _mean(measure, candidate, targets, factor):
             candidate.model,
             with_width(candidate, t.native, factor),
             base_of(candidate, t.native, follows),
+            scale_of(candidate, t.native),
         )
         for t in targets
     ]

@@ -425,9 +425,10 @@ def _of_node(near):
     terms = native_bsdf.view_terms(native, wo)
     _, wi, viewers, _ = _ball()
     # np.interp needs increasing cosines, but they decrease from view to view.
-    columns = terms.taken, terms.gloss, *terms.metal.T
-    taken, gloss, *metal = (np.interp(viewers[:, 2], _views()[::-1], x[::-1]) for x in columns)
-    of_view = native_bsdf.ViewTerms(taken, gloss, np.stack(metal, axis=-1))
+    columns = terms.taken, *terms.gloss.T, *terms.metal.T
+    taken, *rest = (np.interp(viewers[:, 2], _views()[::-1], x[::-1]) for x in columns)
+    gloss, metal = np.stack(rest[:3], axis=-1), np.stack(rest[3:], axis=-1)
+    of_view = native_bsdf.ViewTerms(taken, gloss, metal)
     f_cos = native_bsdf.f_cos_of_view(native, wi, viewers, of_view) * (not near.transmission)
     ball = ball_light(f_cos, native_bsdf.mirror(native, viewers))
     return near.curve, native_bsdf.albedo(native, wo, terms), ball

@@ -2,6 +2,8 @@
 """Finds and moves the animation of node sockets: F-curves of actions and NLA strips, and
 drivers."""
 
+import bpy
+
 from ..common import editable
 
 _VALUE = "default_value"
@@ -94,9 +96,10 @@ def capture(node):
     return list(_of_inputs(node))
 
 
-def move(pairs):
+def move(pairs, readers=None):
     """Moves what animates the values of sockets, curves and drivers, also muted ones, to other
-    sockets of the same tree, whose drivers then read the values there. `pairs`: [(from, to)]."""
+    sockets of the same tree, and has all drivers of the file read the values there. `pairs`:
+    [(from, to)]; `readers`: the Readers of the file, if they are known."""
     if not pairs:
         return
     tree, wanted = pairs[0][0].id_data, {a.as_pointer(): b for a, b in pairs}
@@ -112,24 +115,67 @@ def move(pairs):
         _make_all_own(tree)
     for target in found():
         retarget(*target)
-    _redirect_readers(tree, wanted)
+    (readers or Readers()).redirect(pairs)
 
 
-def _redirect_readers(tree, moved):
-    """Drivers of a tree that read the value of a socket read it where it has been moved to."""
-    owners = _owners(tree)
-    drivers = [c.driver for o in owners if o.animation_data for c in o.animation_data.drivers]
-    for target in (t for driver in drivers for v in driver.variables for t in v.targets):
+def _blocks():
+    """Yields (data-block, its owner if it is embedded, else itself) for all of the file that may
+    have drivers."""
+    for kind in bpy.data.bl_rna.properties:
+        if kind.type != "COLLECTION":
+            continue
+        for block in getattr(bpy.data, kind.identifier):
+            yield block, block
+            for name in ("node_tree", "compositing_node_group"):
+                if (tree := getattr(block, name, None)) is not None and tree.is_embedded_data:
+                    yield tree, block
+
+
+class Readers:
+    """The drivers of the file that read values of sockets. The file is searched once."""
+
+    def __init__(self):
+        #: [(target of a driver's variable, the owner of the driver)] by pointer of the socket.
+        self._found = {}
+        for block, owner in _blocks():
+            data = getattr(block, "animation_data", None)
+            for curve in data.drivers if data else ():
+                for target in (t for v in curve.driver.variables for t in v.targets):
+                    self._add(target, owner)
+
+    def _add(self, target, owner):
         place, _, name = target.data_path.rpartition(".")
-        name, bracket, index = name.partition("[")
-        if target.id not in owners or name != _VALUE:
-            continue
+        if target.id is None or not place or name.partition("[")[0] != _VALUE:
+            return
         try:
-            found = target.id.path_resolve(place)
+            socket = target.id.path_resolve(place)
         except ValueError:  # the node or socket no longer exists
-            continue
-        if (socket := moved.get(found.as_pointer())) is not None:
-            target.data_path = _path(target.id, socket) + bracket + index
+            return
+        if isinstance(socket, bpy.types.NodeSocket):
+            self._found.setdefault(socket.as_pointer(), []).append((target, owner))
+
+    def of(self, socket):
+        """The data-blocks whose drivers read the value of a socket: materials, not their trees."""
+        found = self._found.get(socket.as_pointer(), [])
+        return list(dict.fromkeys(owner for _, owner in found))
+
+    def stuck(self, socket):
+        """Those of them that keep no change, as they are linked from another file."""
+        return [block for block in self.of(socket) if not editable.keeps_changes(block)]
+
+    def redirect(self, pairs):
+        """Has drivers read the values of sockets elsewhere: [(from, to)]."""
+        for old, new in pairs:
+            for target, owner in self._found.pop(old.as_pointer(), []):
+                at = new
+                if not editable.keeps_changes(owner):
+                    at = old
+                else:
+                    # The path may lead to the tree through a material, or through an object's.
+                    tree, _, place = target.data_path.rpartition("nodes[")
+                    _, bracket, index = place.rpartition(".")[2].partition("[")
+                    target.data_path = tree + new.path_from_id(_VALUE) + bracket + index
+                self._found.setdefault(at.as_pointer(), []).append((target, owner))
 
 
 def _path(owner, socket):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finds what makes a material of this extension render wrong: asks each row of the table."""
 
+from dataclasses import replace
+
 import bpy
 
 from ..common.i18n import Sentence, in_percent, say
@@ -78,10 +80,20 @@ def warnings(material, scene):
     at = MaterialContext(SceneContext(scene), material)
     found = of_scene(at.nodes, scene)
     stopped = any(f.code in UNABLE for f in found)
+    of_nodes = {}
     for node in at.nodes:
         stood_in = stopped and nodes.has_stand_in(node) and not nodes.runs_anywhere(node)
-        found += _of_node(NodeContext(at, node, stood_in))
+        for finding in _of_node(NodeContext(at, node, stood_in)):
+            of_nodes.setdefault(finding, []).append(node.label or node.name)
+    found += [_said_of(finding, names) for finding, names in of_nodes.items()]
     return list(dict.fromkeys(found + _found(OF_MATERIAL, at)))
+
+
+def _said_of(finding, names):
+    """The finding of one or more nodes, which it names. What is wrong with all of them is said
+    once."""
+    listed = ", ".join(dict.fromkeys(names))
+    return replace(finding, message=say("{node}: {what}", node=listed, what=finding.message))
 
 
 def enable_osl(scene):

@@ -7,7 +7,6 @@ from functools import cached_property
 import bpy
 
 from .. import lamps
-from ..common.i18n import say
 from ..groups import nodes, update
 from ..lamps import emission
 from ..packs import device, pack
@@ -29,10 +28,6 @@ class SceneContext:
     def __init__(self, scene):
         self.scene = scene
         self.in_cycles = scene.render.engine == "CYCLES"
-
-    def said(self, sentence):
-        """A sentence of a warning about this, as it is shown."""
-        return sentence
 
     @cached_property
     def has_osl(self):
@@ -82,9 +77,6 @@ class MaterialContext:
         self.of_scene, self.scene, self.material = of_scene, of_scene.scene, material
         self.nodes = nodes.shown_nodes(material)
 
-    def said(self, sentence):
-        return sentence
-
     @cached_property
     def use(self):
         """The closure slots that its shaders take."""
@@ -107,9 +99,6 @@ class NodeContext:
         #: The form if Cycles renders it, and the number of lamps that it aims at.
         self.cycles_form = self.form if in_cycles else {}
         self.aims = self.cycles_form.get("lamps") or 0
-
-    def said(self, sentence):
-        return say("{node}: {what}", node=self.node.label or self.node.name, what=sentence)
 
     @property
     def lamps(self):

@@ -47,7 +47,7 @@ class Row:
         """Yields a Finding for each problem in a context."""
         for values in self.predicate(at):
             said = Sentence(self.sentence, more=self.more.format(**values), **values)
-            yield Finding(self.code, self.severity, at.said(said))
+            yield Finding(self.code, self.severity, said)
 
 
 def when(wrong, **values):

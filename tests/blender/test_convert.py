@@ -60,6 +60,21 @@ UNDER_A_SUN = [
         for kind in ("GGX", "MULTI_GGX")
         for color in (GOLD, (0.05, 0.05, 0.05))
     ),
+    # A tint of a dielectric at normal incidence. The base loses what the brightest channel takes.
+    *(
+        (
+            "principled",
+            kind,
+            {
+                "Base_Color": color,
+                "Specular_Tint": (0.1, 0.5, tint),
+                "Roughness": roughness,
+                "IOR": 1.8,
+            },
+        )
+        for kind in ("GGX", "MULTI_GGX")
+        for color, tint, roughness in ((GOLD, 0.9, 0.3), ((0.0, 0.0, 0.0), 1.8, 0.8))
+    ),
     # Colours above 1: all of some nodes, only the base of others.
     ("diffuse", None, {"Color": BRIGHT, "Roughness": 0.0}),
     ("diffuse", None, {"Color": BRIGHT, "Roughness": 0.7}),
@@ -158,14 +173,15 @@ def test_the_nearest_model(extension, convert, kind, inputs, models, worst):
     target, base = nearest_model(convert).Target(native), None
     if plan.base:
         base = nearest_model(convert).Base(plan.base.model, plan.base.values, plan.rest)
-    assert target.error(plan.model, plan.values, base) == pytest.approx(plan.error, rel=1e-9)
-    least = target.misplaced(plan.model, plan.values, base)
+    seen = target.error(plan.model, plan.values, base, plan.scale)
+    assert seen == pytest.approx(plan.error, rel=1e-9)
+    least = target.misplaced(plan.model, plan.values, base, plan.scale)
     for candidate in nearest_model(convert).candidates(native):
         if candidate.model == plan.model and candidate.width:
             for factor in (0.7, 1.4):
                 other = dict(plan.values)
                 other[candidate.width.name] *= factor
-                assert target.misplaced(plan.model, other, base) >= least - 1e-6
+                assert target.misplaced(plan.model, other, base, plan.scale) >= least - 1e-6
 
 
 @pytest.mark.sample(3)
@@ -238,8 +254,8 @@ def test_a_glossy_node_has_no_fresnel_term(convert, distribution, anisotropy):
     glossy = {"Color": (0.5, 0.3, 0.2), "Roughness": 0.8, "Anisotropy": anisotropy}
     plan = only(convert.plan([material_of("glossy", distribution, **glossy)[0]]))
     print(plan.line(), plan.values)
-    assert plan.model == "microfacet" and plan.error < 0.02
-    assert plan.values["tint"][2] < 0.4
+    assert plan.model == "microfacet" and plan.error < 0.01
+    assert plan.scale == pytest.approx(0.5) and plan.values["tint"][2] < 0.6
 
 
 @pytest.mark.parametrize("roughness", [0.2, 0.5, 1.0])
@@ -258,6 +274,59 @@ def test_a_metal_is_the_microfacet_model(convert, roughness):
         assert plan.values.get("distribution") == chosen
         assert plan.values["ax"] == plan.values["ay"] == pytest.approx(roughness**2, rel=0.01)
         assert plan.values["f0"] == pytest.approx(GOLD)
+
+
+@pytest.mark.parametrize("distribution", ["GGX", "MULTI_GGX"])
+@pytest.mark.parametrize("color", [(0.05, 0.05, 0.05), (0.05, 0.03, 0.01), GOLD])
+def test_a_dark_glossy_node_is_near(extension, convert, empty, color, distribution):
+    """The model of a bright colour, dimmed: it does not get bright at grazing angles. A linked
+    colour is so as well, by nodes."""
+    empty.cycles.shading_system = False  # as in new files
+    errors = []
+    for link in (False, True):
+        material, node = material_of("glossy", distribution, Color=color, Roughness=0.3)
+        if link:
+            picture = picture_node(material.node_tree, color, color)
+            picture.image.pixels[:4] = 0.0, 0.0, 0.0, 1.0  # not of a single colour
+            material.node_tree.links.new(picture.outputs["Color"], node.inputs["Color"])
+        before = flat(empty, material)[1]
+        plan = only(extension.api.plan_conversion([material]))
+        print(plan.line(), plan.values, plan.scale)
+        errors.append(plan.error)
+        assert plan.model == "microfacet" and bool(plan.flat) == link
+        assert extension.api.convert_materials([plan]) == 1
+        after = flat(empty, material)[1]
+        print(f"{before} and {after}")
+        assert after == pytest.approx(before, rel=0.015)
+        assert convert.restore(material) == 1
+        assert len(material.node_tree.nodes) == 2 + link
+    assert max(errors) < 0.025
+
+
+@pytest.mark.parametrize("distribution", ["GGX", "MULTI_GGX"])
+@pytest.mark.parametrize(
+    ("inputs", "worst"),
+    [
+        ({"Roughness": 0.3}, 0.03),
+        ({"Roughness": 0.6, "Base_Color": (0.0, 0.0, 0.0)}, 0.13),
+        ({"Roughness": 0.4, "Metallic": 0.3}, 0.04),
+    ],
+)
+def test_a_tinted_plastic_is_near(extension, convert, empty, inputs, worst, distribution):
+    """The tint colours the reflectance at normal incidence."""
+    empty.cycles.shading_system = False  # as in new files
+    tinted = {"Specular_Tint": (1.0, 0.5, 0.1), "IOR": 1.7, "Base_Color": (0.4, 0.3, 0.2)} | inputs
+    material, _ = material_of("principled", distribution, **tinted)
+    before = flat(empty, material)[0]
+    plan = only(extension.api.plan_conversion([material]))
+    print(plan.line(), plan.values)
+    assert not plan.refusal and plan.error < worst
+    red, green, blue = plan.values["f0"]
+    assert blue < 0.3 * green < 0.3 * red
+    assert extension.api.convert_materials([plan]) == 1
+    after = flat(empty, material)[0]
+    print(f"{before} and {after}")
+    assert after == pytest.approx(before, rel=max(1.5 * worst, 0.03))
 
 
 def test_beckmann_is_the_microfacet_model(convert):
@@ -319,7 +388,6 @@ CLEAR = {"Transmission_Weight": 1.0, "Roughness": 0.0, "IOR": 1.4}
     [
         ((1.0, 1.0, 1.0), {}),
         ((1.0, 1.0, 1.0), {"Alpha": 0.6, "Emission_Strength": 0.1}),
-        ((0.8, 0.9, 0.95), {}),
     ],
 )
 def test_a_picture_of_clear_plastic_is_that_of_glass(extension, convert, empty, color, more, osl):
@@ -338,12 +406,12 @@ def test_a_picture_of_clear_plastic_is_that_of_glass(extension, convert, empty, 
     before = ball()
     plan = only(extension.api.plan_conversion([material]))
     assert (plan.model, plan.values["ior"]) == ("fresnel_dielectric", pytest.approx(1.4))
-    assert (plan.error == 0) == (color == (1.0, 1.0, 1.0))
+    assert plan.error == 0
     assert extension.api.convert_materials([plan]) == 1
     off = np.abs(ball() - before).sum() / before.sum()
     print(f"{color} {more}: {off:.3g}, said {plan.error:.3g}")
-    # Light passes two surfaces. Where the alpha chooses paths, another seed changes 3 %.
-    assert off < 2.2 * plan.error + (0.04 if more else 0.005)
+    # Where the alpha chooses paths, another seed changes 3 %.
+    assert off < (0.04 if more else 0.005)
     assert convert.restore(material) == 1 and node.outputs[0].is_linked
 
 
@@ -367,7 +435,8 @@ def test_a_tinted_metal_is_the_microfacet_model(convert, color, roughness, worst
     assert plan.model == "microfacet" and plan.values["tint"] == pytest.approx(tint)
     assert plan.error < worst
     node.inputs["Metallic"].default_value = 0.5
-    assert "has a Specular Tint" in only(convert.plan([material])).refusal
+    plan = only(convert.plan([material]))
+    assert not plan.refusal and plan.metal.values["tint"] == pytest.approx(tint)
 
 
 def test_the_error_is_that_of_the_bright_colour(convert):
@@ -546,12 +615,12 @@ def test_a_strip_still_moves_a_parameter_in_another_form(extension, convert, emp
 
 
 def test_a_limit_is_a_reason(extension, convert):
-    material, node = material_of("glossy", "MULTI_GGX", Roughness=0.5)
+    material, node = material_of("diffuse", Roughness=0.5)
     (plan,) = extension.api.plan_conversion([material])
     assert not plan.refusal and 0.004 < plan.error < 0.35
     (plan,) = extension.api.plan_conversion([material], limit=0.004)
     assert plan.line() == (
-        f"{material.name}, Glossy BSDF: stays, its nearest model, Microfacet, sends "
+        f"{material.name}, Diffuse BSDF: stays, its nearest model, EON Rough Diffuse, sends "
         f"{100 * plan.error:.2g} % of the light in other directions"
     )
     assert extension.api.convert_materials([plan]) == 0 and node.outputs[0].is_linked
@@ -560,6 +629,60 @@ def test_a_limit_is_a_reason(extension, convert):
     # A colour far above 1, which no model can reflect.
     (plan,) = extension.api.plan_conversion([material_of("diffuse", Color=(9.0, 0.0, 0.0))[0]])
     assert "sends 89 % of the light" in plan.refusal
+
+
+CAUSES = [
+    ("diffuse", {"Color": (9.0, 0.0, 0.0)}, "Color"),
+    ("principled", {"Roughness": 0.0, "Diffuse_Roughness": 1.0}, "Diffuse Roughness"),
+    ("principled", {"Roughness": 0.0}, "Roughness"),
+]
+
+
+@pytest.mark.parametrize(("kind", "inputs", "cause"), CAUSES)
+def test_the_input_that_makes_an_error_large_is_said(extension, convert, kind, inputs, cause):
+    plan = only(extension.api.plan_conversion([material_of(kind, **inputs)[0]], limit=0.02))
+    assert plan.refusal.startswith("its nearest model, ")
+    assert plan.refusal.endswith(
+        f" % of the light in other directions, because of the node's {cause}"
+    )
+
+
+def test_what_the_extension_lacks_is_said(extension, convert, empty, monkeypatch):
+    """The nearest models, if it was built for one scene; and whether they need OSL."""
+    plans = import_module(".plans", convert.__package__)
+    metal = material_of("principled", "GGX", Metallic=1.0, Roughness=0.37)[0]
+    monkeypatch.setattr(plans, "_shown", lambda without_osl: lambda model, values: False)
+    why = only(convert.plan([metal])).refusal
+    assert why.startswith(
+        "this extension lacks the models that are near: cook_torrance, microfacet"
+    )
+    shown = {False: lambda model, values: True, True: lambda model, values: False}
+    monkeypatch.setattr(plans, "_shown", shown.get)
+    empty.cycles.shading_system = False
+    why = only(convert.plan([metal])).refusal
+    assert why.startswith("its nearest model, Microfacet, which sends ")
+    assert why.endswith(" needs Open Shading Language for its values")
+
+
+def test_what_has_no_effect_is_no_reason(extension, convert):
+    """Inputs of the plastic part of a metal, and of a highlight that there is none of. A roughness
+    that is linked is not that of the base."""
+    for inputs in ({"Metallic": 1.0}, {"IOR": 1.0, "Diffuse_Roughness": 0.5}):
+        material, node = material_of("principled", **inputs, Anisotropic=0.5)
+        for name in ("IOR", "Specular IOR Level") if "Metallic" in inputs else ("Roughness",):
+            linked(material, node, name, "ShaderNodeTexNoise")
+        plan = only(convert.plan([material]))
+        print(plan.line())
+        assert not plan.refusal and not plan.base and not plan.widths
+
+
+@pytest.mark.parametrize("anisotropy", [-1.0, 1.0, 1.8])
+def test_the_anisotropy_of_a_glossy_node_is_clamped_as_by_cycles(convert, anisotropy):
+    one, other = (
+        only(convert.plan([material_of("glossy", "GGX", Roughness=0.5, Anisotropy=a)[0]]))
+        for a in (anisotropy, 0.99 if anisotropy > 0 else -0.99)
+    )
+    assert one.values == other.values and not one.refusal
 
 
 def test_a_linked_roughness_is_followed(extension, convert):
@@ -612,6 +735,13 @@ REFUSED = [
     ),
     ("principled", {"Subsurface_Weight": 0.2}, "it has Subsurface"),
     ("glass", {"Roughness": 0.3}, "no model is of rough glass"),
+    # A picture of what was coloured and turns white is worse than any error that is stated.
+    ("glass", {"Color": (0.9, 1.0, 1.0)}, "its Color is not white, and Fresnel Dielectric has no"),
+    ("principled", CLEAR | {"Base_Color": (0.8, 0.8, 0.8)}, "its Base Color is not white"),
+    # Values outside the range of a model, or of what Blender's formulas are taken for.
+    ("glass", {"IOR": 0.0}, "IOR of Fresnel Dielectric would be 0, and may be 0.1 to 10"),
+    ("glass", {"IOR": 12.0}, "IOR of Fresnel Dielectric would be 12, and may be 0.1 to 10"),
+    ("principled", {"IOR": 0.7}, "its IOR is below 1"),
 ]
 
 LINKED = [
@@ -1095,7 +1225,7 @@ def test_other_shaders_stay_and_are_said(convert, kind):
     plans = {plan.node: plan for plan in convert.plan([material])}
     assert set(plans) == {node, other}, "what only mixes is not named"
     assert not plans[node].refusal
-    assert plans[other].refusal == "this extension has no model that is near"
+    assert plans[other].refusal == "only Principled, Glossy, Diffuse and Glass nodes convert"
 
 
 # ---- by the buttons ------------------------------------------------------------------------------

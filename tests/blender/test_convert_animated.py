@@ -186,6 +186,84 @@ def test_a_driver_that_reads_what_moves_reads_it_at_its_new_place(extension, con
     assert [seen(1), seen(11)] == pytest.approx([RED[2], BLUE[2]])
 
 
+def read(owner, path, block, place, expression="value"):
+    """A driver of a value of `owner` that reads the one of another data-block at `place`."""
+    driver = owner.driver_add(path).driver
+    driver.expression = expression
+    variable = driver.variables.new()
+    variable.name = "value"
+    kind = "OBJECT" if isinstance(block, bpy.types.Object) else "MATERIAL"
+    variable.targets[0].id_type, variable.targets[0].id = kind, block
+    variable.targets[0].data_path = place
+    return variable.targets[0]
+
+
+#: What takes over a value of the node, and what does: a parameter, a node beside the models, one in
+#: front of them.
+ELSEWHERE = [
+    ("principled", {"Metallic": 1.0}, "Base Color", None),
+    ("principled", {"Alpha": 0.5}, "Alpha", None),
+    ("principled", {"Emission_Strength": 0.5}, "Emission Strength", None),
+    ("glass", {"Color": (1.0, 1.0, 1.0)}, "IOR", None),
+    ("principled", {}, "Roughness", keys),
+]
+
+
+@pytest.mark.parametrize(("kind", "inputs", "name", "animate"), ELSEWHERE)
+def test_drivers_elsewhere_read_the_new_node(
+    extension, convert, empty, kind, inputs, name, animate
+):
+    """Of another material, an object, through its material, and of the scene; and back."""
+    material, node = material_of(kind, **inputs)
+    ball = helpers.add_sphere(empty, material)
+    other, reader = material_of("diffuse")
+    reader = reader.inputs["Roughness"]
+    ball["extra"], socket = 1.0, node.inputs[name]
+    if animate:
+        animate(socket, 0.2, 0.8)
+    place = socket.path_from_id("default_value") + ("[0]" if socket.type == "RGBA" else "")
+    through = f"material_slots[0].material.node_tree.{place}"
+    direct = f"node_tree.{place}"
+    targets = [
+        read(reader, "default_value", material, direct),
+        read(ball, "pass_index", material, direct),
+        read(ball, '["extra"]', ball, through),
+        read(empty, "cycles.samples", material, direct),
+    ]
+    before = [target.data_path for target in targets]
+    (plan,) = extension.api.plan_conversion([material], limit=1)
+    assert not plan.readers
+    assert extension.api.convert_materials([plan]) == 1
+    for target, path in zip(targets, before, strict=True):
+        assert target.data_path != path
+        held = target.id.path_resolve(target.data_path.removesuffix("[0]").rpartition(".")[0])
+        assert held.node != node and (held.is_output or not held.is_linked)
+    assert convert.restore(material) == 1
+    assert [target.data_path for target in targets] == before
+
+
+def test_drivers_that_read_what_no_parameter_is_are_said(extension, convert, empty):
+    """The roughness of plastic becomes two parameters by formulas; the colours of a mixture are
+    two. Those that nothing reads are not named."""
+    material, node = material_of("principled", Metallic=0.5)
+    other, _ = material_of("diffuse")
+    other.name = "Follower"
+    roughness, color = node.inputs["Roughness"], node.inputs["Base Color"]
+    paths = [f"node_tree.{socket.path_from_id('default_value')}" for socket in (roughness, color)]
+    targets = [
+        read(other.node_tree.nodes[0].inputs["Roughness"], "default_value", material, paths[0]),
+        read(empty, "cycles.samples", material, paths[1] + "[1]"),
+    ]
+    before = [target.data_path for target in targets]
+    plan = only(convert.plan([material]))
+    print(plan.line())
+    assert plan.read == ("Base Color", "Roughness") and plan.readers == (empty.name, "Follower")
+    said = f"Drivers of {empty.name}, Follower read its Base Color, Roughness"
+    assert f"{said}, and go on reading the replaced node" in plan.line()
+    assert convert.apply([plan]) == 1
+    assert [target.data_path for target in targets] == before
+
+
 def test_what_is_animated_without_a_node_behind_it_is_a_reason(extension, convert):
     """The output of a group of the user's whose value has keys inside the group."""
     tree = bpy.data.node_groups.new("Number", "ShaderNodeTree")

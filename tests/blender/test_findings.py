@@ -341,6 +341,26 @@ def test_small_lamps_in_an_ideal_mirror(extension, empty):
         assert found(extension, mirror, empty) == {}
 
 
+def test_what_is_wrong_with_several_nodes_is_said_once(extension, empty):
+    """A clamp that darkens both models of each of three materials."""
+    lobes = [("ward", {}), ("blinn", {}), ("ward", {"ks": 0.1})]
+    made = [extension.api.new_sum(lobes, "sampled", name=name) for name in ("A", "B", "C")]
+    extension.scene_loader.apply_clean_settings(empty)
+    empty.cycles.sample_clamp_indirect = empty.cycles.sample_clamp_direct = 3.0
+    for material in made:
+        ours = extension.nodes.group_nodes(material)
+        names = ", ".join(dict.fromkeys(node.label or node.name for node in ours))
+        clamped = [
+            (f.code, f.message)
+            for f in extension.api.warnings(material, empty)
+            if f.code.startswith("clamp")
+        ]
+        print(clamped)
+        assert sorted(code for code, _ in clamped) == ["clamp_direct", "clamp_indirect"]
+        for _, message in clamped:
+            assert message.startswith(f"{names}: ") and message.count("clamped") == 1
+
+
 def test_sheared_area_lamps(extension, empty):
     material = extension.api.new_material("ward", "nodes")
     helpers.add_sphere(empty, material)
