@@ -33,7 +33,7 @@ def warning(plans, scene):
         return None
     return say(
         "Filter Glossy is {value}: in light that other surfaces scatter, it blurs Blender's nodes "
-        "and not their models in Open Shading Language. Pictures differ by up to 11 % with metals, by 1 % with plastics. 0 "
-        "is exact",
+        "and not their models in Open Shading Language. Pictures differ by up to 11 % with metals, "
+        "by 1 % with plastics. 0 is exact",
         value=f"{setting:g}",
     )
