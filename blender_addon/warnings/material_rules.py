@@ -22,12 +22,16 @@ def too_many_closures(at):
 
 
 def few_lamps(at):
-    """Beside the closures of this material Cycles has room for fewer lamps than the scene has."""
+    """Beside the closures of this material Cycles has room for fewer lamps than the scene has, or
+    beside the numbers that several models as Formula Nodes keep."""
     most = closure_slots.most()
     if not at.nodes or at.use.slots > most:
         return
     room = at.use.lamps()
     if room is None or all(lamp.why != lamps.too_many(room) for lamp in at.of_scene.found_lamps):
         return
-    a_lamp = at.use.slots_per_lamp
-    yield {"slots": at.use.slots, "most": most, "slots_per_lamp": a_lamp, "count": room}
+    if at.use.is_limited_by_stack():
+        taken = f"{at.use.trees} models as Formula Nodes, and Cycles keeps 255 numbers at a time"
+    else:
+        taken = f"{at.use.slots} of {most} slots of closures, and {at.use.slots_per_lamp} a lamp"
+    yield {"count": room, "taken": taken}

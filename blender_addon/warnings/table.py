@@ -326,7 +326,7 @@ OF_MATERIAL = (
         "Cycles has room for {count} lamps beside the shaders of this material, so the light of "
         "more lamps is noisy in every material: use fewer models in it",
         material_rules.few_lamps,
-        more="{slots} of {most} slots of closures, and {slots_per_lamp} a lamp",
+        more="{taken}",
     ),
 )
 

@@ -40,13 +40,15 @@ def codes(extension, material, scene):
     return {w.code: w for w in extension.api.warnings(material, scene)}
 
 
-def mix_of(extension, scene, model, count, extra=()):
-    """A material of `count` nodes of a model and other shaders, in equal parts by Mix Shaders."""
+def mix_of(extension, scene, model, count=1, extra=(), others=()):
+    """A material of `count` nodes of a model, nodes of other models and other shaders, in equal
+    parts by Mix Shaders."""
     material = extension.api.new_material(model)
     tree = material.node_tree
     output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
     (first,) = extension.nodes.group_nodes(material)
-    more = [extension.nodes.add_group_node(tree, model).outputs["BSDF"] for _ in range(count - 1)]
+    names = [model] * (count - 1) + list(others)
+    more = [extension.nodes.add_group_node(tree, name).outputs["BSDF"] for name in names]
     more += [tree.nodes.new(kind).outputs[0] for kind in extra]
     shader = first.outputs["BSDF"]
     for i, other in enumerate(more):
@@ -116,3 +118,24 @@ def test_a_mix_of_equal_nodes_is_as_bright_as_one(extension, cpu, count):
     cpu.render.resolution_x = cpu.render.resolution_y = 32
     alone = mean(mix_of(extension, cpu, "phong", 1))
     assert mean(mix_of(extension, cpu, "phong", count)) == pytest.approx(alone, rel=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("models", "room"), [(1, 8), (2, 4), (3, 3), (4, 2)])
+def test_several_models_as_formula_nodes_are_not_black(extension, cpu, models, room):
+    """Under eight area lamps, two different models in a material were black: Cycles keeps at most
+    255 numbers at a time."""
+    cpu.cycles.shading_system, cpu.cycles.samples = False, 64
+    helpers.add_camera(cpu)
+    names = ("schlick", "microfacet", "ashikhmin_shirley")[: models - 1]
+    material = mix_of(extension, cpu, "ward", others=names)
+    put(cpu, material)
+    for index in range(8):
+        turn = 2.4 * index
+        place = (4 * np.sin(turn), -4 * np.cos(turn), 3 + 0.3 * index)
+        helpers.add_lamp(cpu, "AREA", f"Lamp{index}", place, energy=60, size=1 + 0.1 * index)
+    assert filled() == room
+    assert ("closures" in codes(extension, material, cpu)) == (models > 1)
+    cpu.render.resolution_x = cpu.render.resolution_y = 16
+    centre = helpers.render(cpu)[6:10, 6:10, :3]
+    assert centre.mean() > 0.1  # parts of the ball are dark, under lamps alone
