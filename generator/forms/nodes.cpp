@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "closures/closure_pool.h"
+#include "core/json_text.h"
 #include "forms/error.h"
 #include "forms/form.h"
 #include "forms/node_choices.h"
@@ -308,7 +309,7 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
   out.slots = out.closures - out.lamps + out.lamps * slots(ClosureKind::PhongRamp);
   out.closure_bytes = (out.closures - out.lamps) * (pool_bytes(ClosureKind::Ggx) + kPoolNode);
   out.lamp_bytes = out.lamps > 0 ? pool_bytes(ClosureKind::GlossyToon) + kPoolNode : 0;
-  out.source = Json{{"format", 5},
+  const Json source{{"format", 5},
                     {"isotropic", model.info().properties.isotropic},
                     {"narrow", kNarrow},
                     {"widest", kWidestWidened},
@@ -316,9 +317,8 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
                     {"bounds", bounds},
                     {"closures", first.closures},
                     {"base", first.of_base},
-                    {"parts", parts}}
-                   .dump() +
-               "\n";
+                    {"parts", parts}};
+  out.source = json_text(source) + "\n";
   return out;
 }
 
