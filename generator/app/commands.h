@@ -47,6 +47,7 @@ class Option {
   Option type_name(const std::string&) const;
   Option capture_default_str() const;
   Option default_function(const std::function<std::string()>&) const;
+  /// CLI11's check(IsMember()).
   Option is_member(const std::vector<std::string>&) const;
 
  private:
