@@ -17,7 +17,7 @@
 
 namespace brdfc::app {
 
-void add_albedo_command(CLI::App& app) {
+void add_albedo_command(Command app) {
   struct Options {
     std::string model;
     std::vector<std::string> values;
@@ -26,7 +26,7 @@ void add_albedo_command(CLI::App& app) {
     bool store = false;
   };
   auto o = std::make_shared<Options>();
-  CLI::App* cmd = app.add_subcommand(
+  const Command cmd = app.add_subcommand(
       "albedo",
       "Directional albedo by quadrature: integral of f cos over the light directions plus the weights of ideal\n"
       "reflection and refraction.\n"
@@ -34,15 +34,17 @@ void add_albedo_command(CLI::App& app) {
       "        without input, 64 cosines from 0.01 to 1\n"
       "stdout: CSV with header cos_theta_o,albedo_r,albedo_g,albedo_b,mirror_r,mirror_g,mirror_b,error_estimate\n"
       "        (the albedo includes ideal reflection and refraction)");
-  cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
-  cmd->add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
-  add_number(*cmd, "--count", o->count, {2, 1 << 20}, "Number of cosines, from 0.01 to 1; stdin is not read");
-  add_number(*cmd, "--phi", o->phi, {-7, 7}, "Azimuth of the view direction in radians");
-  cmd->add_flag("--store", o->store,
-                "Instead makes the table over all parameters that packs use, and replaces the stored one in\n"
-                "data/albedos")
-      ->excludes("values", "--count", "--phi");
-  cmd->callback([o] {
+  cmd.add_option("model", o->model, "Model, as in `brdfc list`").required();
+  cmd.add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
+  add_number(cmd, "--count", o->count, {2, 1 << 20}, "Number of cosines, from 0.01 to 1; stdin is not read");
+  add_number(cmd, "--phi", o->phi, {-7, 7}, "Azimuth of the view direction in radians");
+  cmd.add_flag("--store", o->store,
+               "Instead makes the table over all parameters that packs use, and replaces the stored one in\n"
+               "data/albedos")
+      .excludes("values")
+      .excludes("--count")
+      .excludes("--phi");
+  cmd.callback([o] {
     const Model& model = find_model(o->model);
     if (o->store) {
       if (!measure::has_albedo_table(model)) {

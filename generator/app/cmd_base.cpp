@@ -8,7 +8,7 @@
 
 namespace brdfc::app {
 
-void add_base_command(CLI::App& app) {
+void add_base_command(Command app) {
   struct Options {
     std::string model;
     std::vector<std::string> values;
@@ -17,7 +17,7 @@ void add_base_command(CLI::App& app) {
     int points = 1 << 16;
   };
   auto o = std::make_shared<Options>();
-  CLI::App* cmd = app.add_subcommand(
+  const Command cmd = app.add_subcommand(
       "base",
       "The share of f cos that the closures of a model's base carry, by view angle; and the variance of one drawn\n"
       "direction, divided by the squared albedo, in a white world and under a smooth sky: if the model draws all of\n"
@@ -27,12 +27,12 @@ void add_base_command(CLI::App& app) {
       "        the integrals of |f cos - base| and of the base, divided by the albedo; the factor for the base with "
       "the\n"
       "        least variance; the variances; and the largest contribution of one direction of the rest");
-  cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
-  cmd->add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
-  add_numbers(*cmd, "--angles", o->angles, {0, 89.999}, "Angles of the view to the normal in degrees");
-  add_number(*cmd, "--phi", o->phi, {-7, 7}, "Azimuth of the view direction in radians");
-  add_number(*cmd, "--points", o->points, {64, 1 << 26}, "Directions for each view");
-  cmd->callback([o] {
+  cmd.add_option("model", o->model, "Model, as in `brdfc list`").required();
+  cmd.add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
+  add_numbers(cmd, "--angles", o->angles, {0, 89.999}, "Angles of the view to the normal in degrees");
+  add_number(cmd, "--phi", o->phi, {-7, 7}, "Azimuth of the view direction in radians");
+  add_number(cmd, "--points", o->points, {64, 1 << 26}, "Directions for each view");
+  cmd.callback([o] {
     const Model& model = find_model(o->model);
     if (!model.has_base()) input_error("{}: has no base: expected a model that declares one", o->model);
     const measure::BoundModel bound = measure::bind_model(model, parse_values(model.info(), o->values));

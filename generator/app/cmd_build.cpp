@@ -15,6 +15,7 @@
 #include "app/scene_needs.h"
 #include "check/check.h"
 #include "core/data_dir.h"
+#include "core/json_text.h"
 #include "core/parse.h"
 #include "forms/form.h"
 #include "pack/pack.h"
@@ -124,7 +125,7 @@ void explain(const Options& options, const std::vector<plan::PlannedModel>& plan
                                {"models", nlohmann::ordered_json::array()}};
     for (const plan::PlannedModel& p : plan) out["models"].push_back(explanation(p, result));
     out["unused_models"] = unused;
-    fmt::print("{}\n", out.dump(2));
+    fmt::print("{}\n", json_text(out, 2));
     return;
   }
   for (const plan::PlannedModel& p : plan) {
@@ -227,53 +228,53 @@ void run(const Options& options) {
 
 }  // namespace
 
-void add_build_command(CLI::App& app) {
+void add_build_command(Command app) {
   auto options = std::make_shared<Options>();
-  CLI::App* c = app.add_subcommand("build", "Write the Blender extension");
+  const Command c = app.add_subcommand("build", "Write the Blender extension");
   const std::string what = "What (one of them)", forms = "Forms, with --scene or --materials", where = "Where";
-  c->add_flag("--all", options->all, "Every model")->group(what);
-  c->add_option("--model", options->models, "Only these models (repeat for several)")->group(what);
-  c->add_option("--scene", options->scene,
-                "Only what the materials of a scene file need: models, forms, parameters that are not constant, "
-                "view angles")
-      ->group(what);
-  c->add_option("--materials", options->materials,
-                "Only what a .blend uses, given in a file that the extension wrote (Write Materials)")
-      ->group(what);
-  add_number(*c, "--error", options->error,
+  c.add_flag("--all", options->all, "Every model").group(what);
+  c.add_option("--model", options->models, "Only these models (repeat for several)").group(what);
+  c.add_option("--scene", options->scene,
+               "Only what the materials of a scene file need: models, forms, parameters that are not constant, "
+               "view angles")
+      .group(what);
+  c.add_option("--materials", options->materials,
+               "Only what a .blend uses, given in a file that the extension wrote (Write Materials)")
+      .group(what);
+  add_number(c, "--error", options->error,
              {.low = 0, .high = 100, .unit = '%', .in_words = "percent from 0 to 100, as 5 or 5%"},
              "Largest error of a fitted form in percent of the light (relative L1 of f cos), for example 5%. Applies\n"
              "to materials of a scene that leave their form open, and to .blend materials with a sampled form, which\n"
              "get a fitted form as well. By default, forms are fitted only on request")
-      ->group(forms);
-  add_number(*c, "--time", options->time,
+      .group(forms);
+  add_number(c, "--time", options->time,
              {.low = 0, .above_low = true, .unit = 'x', .in_words = "a positive number, as 1.2 or 1.2x"},
              "Largest cost of a form for materials that leave their form open: CPU time at equal samples, in units\n"
              "of Blender's Glossy node, for example 1.2x; --explain prints the costs of forms")
-      ->group(forms);
-  c->add_flag("--fit", options->fit_bases,
-              "Fits closures to the materials where possible, as the base of their aimed forms, which reduces noise\n"
-              "under skies and images; takes seconds to minutes for each material")
-      ->group(forms);
-  c->add_flag("--twin", options->twin,
-              "Adds a twin for every material with constant parameters: Blender's own nodes, for devices without\n"
-              "Open Shading Language")
-      ->group(forms);
-  c->add_flag("--osl-only", options->osl_only,
-              "Only for renders with Open Shading Language: leaves out the formula nodes that materials with an open\n"
-              "form use where it is off")
-      ->group(forms);
-  c->add_flag("--explain", options->json,
-              "Prints as JSON which forms exist, what is left out and why, and what that saves")
-      ->group(forms);
-  c->add_option("--out", options->out, "Folder for the extension and its zip")->group(where);
-  c->add_option("--osl", options->osl,
-                "Writes to this folder, instead of an extension, every model (or those of --model) as a shader for\n"
-                "Blender's Script node, and its formulas as OSL without closures")
-      ->group(where);
-  c->add_option("--addon", options->addon, "Folder with the add-on's Python, instead of the one in `brdfc where`")
-      ->group(where);
-  c->callback([options] { run(*options); });
+      .group(forms);
+  c.add_flag("--fit", options->fit_bases,
+             "Fits closures to the materials where possible, as the base of their aimed forms, which reduces noise\n"
+             "under skies and images; takes seconds to minutes for each material")
+      .group(forms);
+  c.add_flag("--twin", options->twin,
+             "Adds a twin for every material with constant parameters: Blender's own nodes, for devices without\n"
+             "Open Shading Language")
+      .group(forms);
+  c.add_flag("--osl-only", options->osl_only,
+             "Only for renders with Open Shading Language: leaves out the formula nodes that materials with an open\n"
+             "form use where it is off")
+      .group(forms);
+  c.add_flag("--explain", options->json,
+             "Prints as JSON which forms exist, what is left out and why, and what that saves")
+      .group(forms);
+  c.add_option("--out", options->out, "Folder for the extension and its zip").group(where);
+  c.add_option("--osl", options->osl,
+               "Writes to this folder, instead of an extension, every model (or those of --model) as a shader for\n"
+               "Blender's Script node, and its formulas as OSL without closures")
+      .group(where);
+  c.add_option("--addon", options->addon, "Folder with the add-on's Python, instead of the one in `brdfc where`")
+      .group(where);
+  c.callback([options] { run(*options); });
 }
 
 }  // namespace brdfc::app

@@ -6,18 +6,19 @@
 #include "app/commands.h"
 #include "app/numbers.h"
 #include "check/check.h"
+#include "core/json_text.h"
 #include "measure/properties.h"
 
 namespace brdfc::app {
 
-void add_check_command(CLI::App& app) {
+void add_check_command(Command app) {
   struct Options {
     std::string model;
     bool all = false, json = false, markdown = false;
     check::Options check;
   };
   auto o = std::make_shared<Options>();
-  CLI::App* cmd = app.add_subcommand(
+  const Command cmd = app.add_subcommand(
       "check",
       "Tests the properties that models declare (energy, reciprocity, isotropy, positive values, smoothness, limits; "
       "a\n"
@@ -26,16 +27,16 @@ void add_check_command(CLI::App& app) {
       "models\n"
       "it then prints a table of properties. A check that does not apply to a model is skipped, with the reason. Exit\n"
       "status 1 if a check fails.");
-  CLI::Option* model = cmd->add_option("model", o->model, "Model, as in `brdfc list`; all models if omitted");
-  cmd->add_flag("--all", o->all, "All models, as if no model is given")->excludes(model);
-  CLI::Option* json = cmd->add_flag(
+  const Option model = cmd.add_option("model", o->model, "Model, as in `brdfc list`; all models if omitted");
+  cmd.add_flag("--all", o->all, "All models, as if no model is given").excludes(model);
+  const Option json = cmd.add_flag(
       "--json", o->json, "Print JSON: an array with one object per row; passed is null if the check was skipped");
-  cmd->add_flag("--markdown", o->markdown, "Print only the table of properties of all models, as Markdown")
-      ->excludes(model)
-      ->excludes(json);
-  add_number(*cmd, "--effort", o->check.effort, {0.01, 1000}, "Scales the numbers of cases, directions and samples");
-  add_number(*cmd, "--seed", o->check.seed, {}, "Seed of the random parameters and directions");
-  cmd->callback([o] {
+  cmd.add_flag("--markdown", o->markdown, "Print only the table of properties of all models, as Markdown")
+      .excludes(model)
+      .excludes(json);
+  add_number(cmd, "--effort", o->check.effort, {0.01, 1000}, "Scales the numbers of cases, directions and samples");
+  add_number(cmd, "--seed", o->check.seed, {}, "Seed of the random parameters and directions");
+  cmd.callback([o] {
     if (o->markdown) {
       fmt::print("{}", measure::property_table(true));
       return;
@@ -82,7 +83,7 @@ void add_check_command(CLI::App& app) {
         if (!r.declare.empty()) fmt::print("    say {} if that is meant\n", r.declare);
       }
     }
-    if (o->json) fmt::print("{}\n", all.dump(2));
+    if (o->json) fmt::print("{}\n", json_text(all, 2));
     if (!o->json && o->model.empty()) fmt::print("\n{}", measure::property_table(false));
     std::fflush(stdout);
     if (failed > 0) throw CheckFailed(fmt::format("{} of the declared properties failed", failed));

@@ -68,13 +68,13 @@ Lobe lobe(LobeKind kind, const ParamValues& v) {
 
 }  // namespace
 
-void add_closure_command(CLI::App& app) {
+void add_closure_command(Command app) {
   struct Options {
     std::string kind;
     std::vector<std::string> values;
   };
   auto o = std::make_shared<Options>();
-  CLI::App* cmd = app.add_subcommand(
+  const Command cmd = app.add_subcommand(
       "closure",
       "f cos(theta_i) of a Cycles closure, as the forms assume it, for pairs of directions.\n"
       "Kinds: diffuse, burley, oren_nayar, velvet, diffuse_ramp, phong_ramp, reflection, ggx, beckmann,\n"
@@ -82,9 +82,9 @@ void add_closure_command(CLI::App& app) {
       "roughness, albedo, size, smooth, ramp_0 ... ramp_7.\n"
       "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors above the surface)\n"
       "stdout: CSV with header f_cos_r,f_cos_g,f_cos_b");
-  cmd->add_option("kind", o->kind, "Which closure")->required();
-  cmd->add_option("values", o->values, "name=value; a colour or vector is three numbers or one");
-  cmd->callback([o] {
+  cmd.add_option("kind", o->kind, "Which closure").required();
+  cmd.add_option("values", o->values, "name=value; a colour or vector is three numbers or one");
+  cmd.callback([o] {
     const LobeKind kind = lobe_named(o->kind);
     const ModelInfo info = schema(o->kind);
     const Lobe c = lobe(kind, complete(info, parse_values(info, o->values)));

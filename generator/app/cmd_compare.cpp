@@ -4,6 +4,7 @@
 #include "app/commands.h"
 #include "app/numbers.h"
 #include "core/error.h"
+#include "core/json_text.h"
 #include "reference/image.h"
 #include "report/statistics.h"
 
@@ -30,7 +31,7 @@ void keep_evidence(const std::filesystem::path& folder, const reference::Renderi
 
 }  // namespace
 
-void add_compare_command(CLI::App& app) {
+void add_compare_command(Command app) {
   struct Options {
     std::vector<std::string> files;
     std::string diff, keep;
@@ -38,31 +39,31 @@ void add_compare_command(CLI::App& app) {
     double scale = 0.25, inject = 0;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
+  const Command command = app.add_subcommand(
       "compare",
       "Error of picture A against the reference picture B. With several A, rendered from different seeds, their mean\n"
       "is judged, and --test tells error from noise.");
-  command->add_option("A... B", options->files, "One or more EXR files to judge, then the reference EXR")
-      ->required()
-      ->expected(2, 1 << 16);
-  command->add_flag("--json", options->json, "Print JSON instead of a table");
-  command->add_option("--diff", options->diff,
-                      "Write the difference as PNG: red where A is brighter, blue where darker");
-  add_number(*command, "--diff-scale", options->scale, {1e-9, 1e9},
+  command.add_option("A... B", options->files, "One or more EXR files to judge, then the reference EXR")
+      .required()
+      .expected(2, 1 << 16);
+  command.add_flag("--json", options->json, "Print JSON instead of a table");
+  command.add_option("--diff", options->diff,
+                     "Write the difference as PNG: red where A is brighter, blue where darker");
+  add_number(command, "--diff-scale", options->scale, {1e-9, 1e9},
              "Difference shown in full colour, relative to the mean of B")
-      ->capture_default_str();
-  CLI::Option* test = command->add_flag(
+      .capture_default_str();
+  const Option test = command.add_flag(
       "--test", options->test,
       "Welch's t-test per pixel and per tile of 16 x 16, Sidak-corrected at 0.01; exit status 1 unless 99.75 % of the\n"
       "pixels and all tiles are accepted. Needs two A or more, and a B with a variance layer");
   command
-      ->add_option("--keep", options->keep,
-                   "If the test fails, write both pictures, their difference and the p-values to this folder")
-      ->needs(test);
-  add_number(*command, "--inject", options->inject, {-1, 1},
+      .add_option("--keep", options->keep,
+                  "If the test fails, write both pictures, their difference and the p-values to this folder")
+      .needs(test);
+  add_number(command, "--inject", options->inject, {-1, 1},
              "First brighten A by this fraction, to see whether the test detects it")
-      ->needs(test);
-  command->callback([options] {
+      .needs(test);
+  command.callback([options] {
     const std::string name_a = options->files.front(), name_b = options->files.back();
     std::vector<reference::Rendering> pictures;
     for (std::size_t i = 0; i + 1 < options->files.size(); ++i) {
@@ -91,7 +92,7 @@ void add_compare_command(CLI::App& app) {
     if (options->json) {
       nlohmann::ordered_json out = to_json(c);
       if (t) out["test"] = to_json(*t);
-      fmt::print("{}\n", out.dump(2));
+      fmt::print("{}\n", json_text(out, 2));
     } else {
       fmt::print("relMSE     {:.6g}\nMSE        {:.6g}\nmean A     {:.6g}\nmean B     {:.6g}\nbias       {:.6g}\n",
                  c.rel_mse, c.mse, c.mean_a, c.mean_b, c.bias);

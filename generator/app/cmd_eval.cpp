@@ -8,20 +8,20 @@
 
 namespace brdfc::app {
 
-void add_eval_command(CLI::App& app) {
+void add_eval_command(Command app) {
   struct Options {
     std::string model;
     std::vector<std::string> values;
   };
   auto o = std::make_shared<Options>();
-  CLI::App* cmd =
+  const Command cmd =
       app.add_subcommand("eval",
                          "BRDF (1/sr, no cosine, no delta terms) and pdf (per solid angle) for pairs of directions.\n"
                          "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors, z is the normal)\n"
                          "stdout: CSV with header f_r,f_g,f_b,pdf");
-  cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
-  cmd->add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
-  cmd->callback([o] {
+  cmd.add_option("model", o->model, "Model, as in `brdfc list`").required();
+  cmd.add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
+  cmd.callback([o] {
     const Model& model = find_model(o->model);
     const measure::BoundModel bound = measure::bind_model(model, parse_values(model.info(), o->values));
     CsvReader in(std::cin, "stdin", {"wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z"});

@@ -25,13 +25,14 @@ void run(const fs::path& out) {
 
 }  // namespace
 
-void add_explorer_command(CLI::App& app) {
+void add_explorer_command(Command app) {
   auto out = std::make_shared<std::string>();
-  CLI::App* cmd = app.add_subcommand("explorer",
-                                     "Writes a page that draws all models in a browser, from their formulas: curves,\n"
-                                     "albedo, lit spheres, differences. It needs WebGL 2, no server and no network.");
-  cmd->add_option("--out", *out, "Folder for the page; begin with its index.html")->required();
-  cmd->callback([out] { run(*out); });
+  const Command cmd =
+      app.add_subcommand("explorer",
+                         "Writes a page that draws all models in a browser, from their formulas: curves,\n"
+                         "albedo, lit spheres, differences. It needs WebGL 2, no server and no network.");
+  cmd.add_option("--out", *out, "Folder for the page; begin with its index.html").required();
+  cmd.callback([out] { run(*out); });
 }
 
 }  // namespace brdfc::app

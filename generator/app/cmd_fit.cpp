@@ -38,7 +38,7 @@ void print_errors(const std::vector<fit::ViewError>& errors, const std::string& 
 
 }  // namespace
 
-void add_fit_command(CLI::App& app) {
+void add_fit_command(Command app) {
   struct Options {
     std::string model;
     std::vector<std::string> values;
@@ -47,7 +47,7 @@ void add_fit_command(CLI::App& app) {
     bool pairs = false, twin = false, store = false;
   };
   auto o = std::make_shared<Options>();
-  CLI::App* cmd = app.add_subcommand(
+  const Command cmd = app.add_subcommand(
       "fit",
       "Error of the fitted form by view angle: Cycles closures whose sum approximates a model with these "
       "parameters.\n"
@@ -55,31 +55,31 @@ void add_fit_command(CLI::App& app) {
       "absolute difference of f cos divided by the albedo, the same in the L2 norm, the difference of the albedo, and\n"
       "the negative part of f cos.\n"
       "stderr: the median, the 95th percentile and the maximum of relative_l1");
-  cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
-  cmd->add_option("values", o->values, "name=value; a colour is three numbers or one");
-  cmd->add_option("--over", o->over,
-                  "Fit along this Number parameter, over the whole range of its slider, instead of a value. Adds a\n"
-                  "column with its value: both ends, and the middle between any two knots of the tables");
-  cmd->add_option(
+  cmd.add_option("model", o->model, "Model, as in `brdfc list`").required();
+  cmd.add_option("values", o->values, "name=value; a colour is three numbers or one");
+  cmd.add_option("--over", o->over,
+                 "Fit along this Number parameter, over the whole range of its slider, instead of a value. Adds a\n"
+                 "column with its value: both ends, and the middle between any two knots of the tables");
+  cmd.add_option(
       "--any", o->any,
       "Parameters of which f is a polynomial (degree up to 2 for a colour, 1 for a number), or nearly so for a\n"
       "single colour, for any of their values: closures are fitted to f at a few values, and the worst error is\n"
       "printed");
-  cmd->add_flag("--twin", o->twin,
-                "Error of the twin instead: Blender's own nodes, whose weights, roughness and tilt depend on the view");
-  cmd->add_flag("--pairs", o->pairs,
-                "f cos(theta_i) of the closures instead, for pairs of directions.\n"
-                "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors above the surface)\n"
-                "stdout: CSV with header f_cos_r,f_cos_g,f_cos_b");
-  cmd->add_flag("--store", o->store,
-                "With --over: makes the fit again and replaces the stored one in data/fits.\n"
-                "With --twin: does the same for the extension's twin, in data/twins")
-      ->excludes("--pairs");
-  cmd->add_option("--exr", o->exr,
-                  "Also writes the tables of the closures as a float EXR, with one row per table; the attribute\n"
-                  "brdfc:table describes them")
-      ->excludes("--twin");
-  cmd->callback([o] {
+  cmd.add_flag("--twin", o->twin,
+               "Error of the twin instead: Blender's own nodes, whose weights, roughness and tilt depend on the view");
+  cmd.add_flag("--pairs", o->pairs,
+               "f cos(theta_i) of the closures instead, for pairs of directions.\n"
+               "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors above the surface)\n"
+               "stdout: CSV with header f_cos_r,f_cos_g,f_cos_b");
+  cmd.add_flag("--store", o->store,
+               "With --over: makes the fit again and replaces the stored one in data/fits.\n"
+               "With --twin: does the same for the extension's twin, in data/twins")
+      .excludes("--pairs");
+  cmd.add_option("--exr", o->exr,
+                 "Also writes the tables of the closures as a float EXR, with one row per table; the attribute\n"
+                 "brdfc:table describes them")
+      .excludes("--twin");
+  cmd.callback([o] {
     const Model& model = find_model(o->model);
     ParamValues values = complete(model.info(), parse_values(model.info(), o->values));
     // The pairs of directions are evaluated at one value of each parameter.

@@ -31,13 +31,13 @@ measure::KernelCurve read_curve(const std::string& path) {
 
 }  // namespace
 
-void add_kernel_command(CLI::App& app) {
+void add_kernel_command(Command app) {
   struct Options {
     std::string file;
     double n = 0;
   };
   auto o = std::make_shared<Options>();
-  CLI::App* cmd = app.add_subcommand(
+  const Command cmd = app.add_subcommand(
       "kernel",
       "Parameters of the model lossless for a drawn kernel k(u), u = n |x' - y'|: the four heights and the glossiness\n"
       "with the smallest error.\n"
@@ -45,11 +45,11 @@ void add_kernel_command(CLI::App& app) {
       "        linear between them and constant outside\n"
       "stdout: n=... kernel=table h0=... h1=... h2=... h3=..., as other commands take them\n"
       "stderr: largest relative difference of the kernel, and relative L1 of f cos");
-  cmd->add_option("file", o->file, "The curve")->required();
+  cmd.add_option("file", o->file, "The curve").required();
   const ParamInfo& n = *find_model("lossless").info().param("n");
   o->n = n.value[0];
-  add_number(*cmd, "--n", o->n, {0, n.max, true}, "Glossiness for which the curve is drawn")->capture_default_str();
-  cmd->callback([o] {
+  add_number(cmd, "--n", o->n, {0, n.max, true}, "Glossiness for which the curve is drawn").capture_default_str();
+  cmd.callback([o] {
     const measure::KernelFit fit = measure::fit_kernel(read_curve(o->file), o->n);
     std::string line;
     for (const char* name : {"n", "kernel", "h0", "h1", "h2", "h3"}) {

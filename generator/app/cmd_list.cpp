@@ -4,6 +4,7 @@
 
 #include "app/commands.h"
 #include "core/error.h"
+#include "core/json_text.h"
 #include "forms/form.h"
 #include "model/model.h"
 #include "pack/manifest.h"
@@ -74,15 +75,15 @@ void print_text(const Model& m) {
 
 }  // namespace
 
-void add_list_command(CLI::App& app) {
+void add_list_command(Command app) {
   auto json = std::make_shared<bool>(false);
-  CLI::App* cmd = app.add_subcommand("list", "The models, their parameters and forms.");
-  cmd->add_flag("--json", *json, "Print JSON: an array of objects");
-  cmd->callback([json] {
+  const Command cmd = app.add_subcommand("list", "The models, their parameters and forms.");
+  cmd.add_flag("--json", *json, "Print JSON: an array of objects");
+  cmd.callback([json] {
     if (*json) {
       Json all = Json::array();
       for (const auto& [name, model] : models()) all.push_back(describe(*model));
-      fmt::print("{}\n", all.dump(2));
+      fmt::print("{}\n", json_text(all, 2));
     } else {
       for (const auto& [name, model] : models()) print_text(*model);
     }

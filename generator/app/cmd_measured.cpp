@@ -8,6 +8,7 @@
 #include "app/commands.h"
 #include "app/numbers.h"
 #include "core/csv.h"
+#include "core/json_text.h"
 #include "core/text.h"
 #include "measured/findings.h"
 #include "measured/fit_lobes.h"
@@ -99,7 +100,7 @@ void print_pairs(const Brdf<double>& brdf) {
 
 }  // namespace
 
-void add_measured_command(CLI::App& app) {
+void add_measured_command(Command app) {
   struct Options {
     std::string file;
     bool json = false, pairs = false;
@@ -110,7 +111,7 @@ void add_measured_command(CLI::App& app) {
     std::vector<std::string> from;
   };
   auto o = std::make_shared<Options>();
-  CLI::App* cmd = app.add_subcommand(
+  const Command cmd = app.add_subcommand(
       "measured",
       "What a file with a measured BRDF holds, what it lacks, how much light it reflects, and every model fitted to "
       "it,\n"
@@ -120,35 +121,35 @@ void add_measured_command(CLI::App& app) {
       "theta_i,phi_i,theta_o,phi_o in degrees (theta_i_rad,... in radians), or wi_x,wi_y,wi_z,wo_x,wo_y,wo_z, and "
       "r,g,b in 1/sr, a row for every\n"
       "combination of angles. Colours are linear Rec.709.");
-  cmd->add_option("file", o->file, "The file")->required();
-  cmd->add_flag("--json", o->json, "JSON");
-  cmd->add_option("--models", o->models, "Names of the models to fit, separated by commas; all, or none")
-      ->delimiter(',')
-      ->capture_default_str();
-  CLI::Option* lobes =
-      add_number(*cmd, "--lobes", o->lobes, {1, kMostLobes},
+  cmd.add_option("file", o->file, "The file").required();
+  cmd.add_flag("--json", o->json, "JSON");
+  cmd.add_option("--models", o->models, "Names of the models to fit, separated by commas; all, or none")
+      .delimiter(',')
+      .capture_default_str();
+  const Option lobes =
+      add_number(cmd, "--lobes", o->lobes, {1, kMostLobes},
                  "Sums of 1, 2, ... up to this number of lobes, each with its error. Models are fitted only if\n"
                  "--models names them then");
-  cmd->add_option("--from", o->from,
-                  "Names of the models whose lobes may be in a sum, separated by commas; all that have some")
-      ->delimiter(',')
-      ->needs(lobes);
-  cmd->add_flag("--no-matte", o->no_matte,
-                "Fits are of the models alone, without light of a Lambert surface beside them");
-  add_numbers(*cmd, "--at", o->at, {0, 90, false, 0, "degrees from 0 to 89.9"},
+  cmd.add_option("--from", o->from,
+                 "Names of the models whose lobes may be in a sum, separated by commas; all that have some")
+      .delimiter(',')
+      .needs(lobes);
+  cmd.add_flag("--no-matte", o->no_matte,
+               "Fits are of the models alone, without light of a Lambert surface beside them");
+  add_numbers(cmd, "--at", o->at, {0, 90, false, 0, "degrees from 0 to 89.9"},
               "Views whose reflected light is said: degrees to the normal, separated by commas; 0, 15, 30, ... 89");
-  cmd->add_flag("--pairs", o->pairs,
-                "The BRDF in 1/sr for pairs of directions, and the pdf of the reference renderer's samples, instead.\n"
-                "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors)\n"
-                "stdout: CSV with header f_r,f_g,f_b,pdf")
-      ->excludes("--json")
-      ->excludes("--models")
-      ->excludes("--lobes")
-      ->excludes("--from")
-      ->excludes("--no-matte")
-      ->excludes("--at");
-  cmd->callback([o, cmd] {
-    if (o->lobes && cmd->count("--models") == 0) o->models = {"none"};
+  cmd.add_flag("--pairs", o->pairs,
+               "The BRDF in 1/sr for pairs of directions, and the pdf of the reference renderer's samples, instead.\n"
+               "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors)\n"
+               "stdout: CSV with header f_r,f_g,f_b,pdf")
+      .excludes("--json")
+      .excludes("--models")
+      .excludes("--lobes")
+      .excludes("--from")
+      .excludes("--no-matte")
+      .excludes("--at");
+  cmd.callback([o, cmd] {
+    if (o->lobes && cmd.count("--models") == 0) o->models = {"none"};
     if (o->from == std::vector<std::string>{"all"}) o->from.clear();
     const auto start = std::chrono::steady_clock::now();
     const measured::Measurement m = measured::read_measurement(o->file, reference::ColorConfig::current().to_rec709());
@@ -193,7 +194,7 @@ void add_measured_command(CLI::App& app) {
       for (const measured::LobeSum& sum : sums) j["sums"].push_back(describe(sum));
     }
     if (o->json) {
-      fmt::print("{}\n", j.dump(1));
+      fmt::print("{}\n", json_text(j, 1));
       return;
     }
     fmt::print("{}  {}, {}\n", m.file, m.format, m.isotropic ? "isotropic" : "anisotropic");

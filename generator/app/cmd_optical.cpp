@@ -4,6 +4,7 @@
 
 #include "app/commands.h"
 #include "app/numbers.h"
+#include "core/json_text.h"
 #include "model/optical.h"
 #include "reference/color.h"
 
@@ -67,33 +68,33 @@ void print_text(const Json& j) {
 
 }  // namespace
 
-void add_optical_command(CLI::App& app) {
+void add_optical_command(Command app) {
   struct Options {
     std::string name;
     bool json = false;
     double thickness = kThickness;
   };
   auto o = std::make_shared<Options>();
-  CLI::App* cmd = app.add_subcommand(
+  const Command cmd = app.add_subcommand(
       "optical",
       "Converts metals, glass and liquids with a measured refractive index n + i k to the working space: reflectance\n"
       "at normal incidence, and n and k by channel; for transparent substances also n_d, the Abbe number, and the\n"
       "transmittance for a thickness.\n"
       "The working space is the role scene_linear of the configuration that OCIO names, otherwise Rec.709.");
-  cmd->add_option("name", o->name,
-                  "Substance, or a file NAME.csv as exported by refractiveindex.info; all substances if omitted");
-  add_number(*cmd, "--thickness", o->thickness, {kThinnest, kThickest},
+  cmd.add_option("name", o->name,
+                 "Substance, or a file NAME.csv as exported by refractiveindex.info; all substances if omitted");
+  add_number(cmd, "--thickness", o->thickness, {kThinnest, kThickest},
              "Distance in metres for which the absorption of a glass is exact; prints the error at others")
-      ->capture_default_str();
-  cmd->add_flag("--json", o->json, "Print JSON, with X, Y, Z under D65 relative to a perfect reflector as well");
-  cmd->callback([o] {
+      .capture_default_str();
+  cmd.add_flag("--json", o->json, "Print JSON, with X, Y, Z under D65 relative to a perfect reflector as well");
+  cmd.callback([o] {
     Json all = Json::array();
     if (o->name.empty())
       for (const Substance& s : substances()) all.push_back(describe(s, o->thickness));
     else
       all.push_back(describe(with_notes(find_substance(o->name, "")), o->thickness));
     if (o->json) {
-      fmt::print("{}\n", (o->name.empty() ? all : all[0]).dump(1));
+      fmt::print("{}\n", json_text(o->name.empty() ? all : all[0], 1));
       return;
     }
     for (const Json& j : all) print_text(j);

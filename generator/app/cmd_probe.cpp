@@ -55,14 +55,14 @@ void run_points(const Model& model, const ParamValues& choices) {
 
 }  // namespace
 
-void add_probe_command(CLI::App& app) {
+void add_probe_command(Command app) {
   struct Options {
     std::string model;
     std::vector<std::string> choices;
     bool run = false;
   };
   auto o = std::make_shared<Options>();
-  CLI::App* cmd = app.add_subcommand(
+  const Command cmd = app.add_subcommand(
       "probe",
       "Prints an OSL shader that shows f, pdf and samples of a model, computed by its recorded formulas. With --run "
       "it\n"
@@ -71,10 +71,10 @@ void add_probe_command(CLI::App& app) {
       "                 name_r,name_g,name_b)\n"
       "stdout of --run: CSV of f_r,f_g,f_b,pdf,wi_x,wi_y,wi_z,weight_r,weight_g,weight_b,sample_pdf for each;\n"
       "                 -31337 stands for values that are not finite");
-  cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
-  cmd->add_option("choices", o->choices, "Choices as name=value");
-  cmd->add_flag("--run", o->run, "Compute the points from stdin");
-  cmd->callback([o] {
+  cmd.add_option("model", o->model, "Model, as in `brdfc list`").required();
+  cmd.add_option("choices", o->choices, "Choices as name=value");
+  cmd.add_flag("--run", o->run, "Compute the points from stdin");
+  cmd.callback([o] {
     const Model& model = find_model(o->model);
     ParamValues choices = parse_values(model.info(), o->choices);
     for (const ParamInfo& p : model.info().params) {

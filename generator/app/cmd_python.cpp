@@ -35,14 +35,14 @@ void run(const fs::path& out) {
 
 }  // namespace
 
-void add_python_command(CLI::App& app) {
+void add_python_command(Command app) {
   auto out = std::make_shared<std::string>();
-  CLI::App* cmd =
+  const Command cmd =
       app.add_subcommand("python",
                          "Writes the Python package `brdfc`: every model's formulas on NumPy arrays, in double\n"
                          "precision, with pyproject.toml. `pip install DIR` installs it.");
-  cmd->add_option("--out", *out, "Folder for the package")->required();
-  cmd->callback([out] { run(*out); });
+  cmd.add_option("--out", *out, "Folder for the package").required();
+  cmd.callback([out] { run(*out); });
 }
 
 }  // namespace brdfc::app

@@ -76,46 +76,46 @@ class ProgressLine {
 
 }  // namespace
 
-void add_render_command(CLI::App& app) {
+void add_render_command(Command app) {
   struct Options {
     std::string scene, out, preview, view, strategy, pattern, from = "camera";
     int spp = 0, seed = -1, threads = 0, width = 0, height = 0;
     double max_seconds = 0, scale = 1, exposure = 0;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("render", "Render the reference picture of a scene");
-  command->add_option("SCENE", options->scene, "Scene file (.json)")->required();
-  command->add_option("--out", options->out, "EXR to write, with a variance layer")->required();
-  add_number(*command, "--spp", options->spp, {1, 10000000}, "Samples per pixel (default: the scene's)");
-  add_number(*command, "--seed", options->seed, {0, 2147483647}, "Seed of the random numbers (default: the scene's)");
-  add_number(*command, "--threads", options->threads, {1, 1024},
+  const Command command = app.add_subcommand("render", "Render the reference picture of a scene");
+  command.add_option("SCENE", options->scene, "Scene file (.json)").required();
+  command.add_option("--out", options->out, "EXR to write, with a variance layer").required();
+  add_number(command, "--spp", options->spp, {1, 10000000}, "Samples per pixel (default: the scene's)");
+  add_number(command, "--seed", options->seed, {0, 2147483647}, "Seed of the random numbers (default: the scene's)");
+  add_number(command, "--threads", options->threads, {1, 1024},
              "Threads (default: all); the picture does not depend on it");
-  add_number(*command, "--max-seconds", options->max_seconds, {0.001, 1e7},
+  add_number(command, "--max-seconds", options->max_seconds, {0.001, 1e7},
              "Stop after this time, with at least one sample per pixel");
-  CLI::Option* width = add_number(*command, "--width", options->width, {1, 16384}, "Pixels");
-  CLI::Option* height = add_number(*command, "--height", options->height, {1, 16384}, "Pixels");
-  add_number(*command, "--scale", options->scale, {0.001, 64}, "Factor on the scene's resolution")
-      ->excludes(width)
-      ->excludes(height);
+  const Option width = add_number(command, "--width", options->width, {1, 16384}, "Pixels");
+  const Option height = add_number(command, "--height", options->height, {1, 16384}, "Pixels");
+  add_number(command, "--scale", options->scale, {0.001, 64}, "Factor on the scene's resolution")
+      .excludes(width)
+      .excludes(height);
   command
-      ->add_option("--strategy", options->strategy,
-                   "Sample BRDF and lights (mis), or only one of them (default: the scene's)")
-      ->check(CLI::IsMember(reference::strategy_names()));
-  command->add_option("--pattern", options->pattern, "Sampling pattern of a pixel (default: the scene's)")
-      ->check(CLI::IsMember(reference::pattern_names()));
+      .add_option("--strategy", options->strategy,
+                  "Sample BRDF and lights (mis), or only one of them (default: the scene's)")
+      .is_member(reference::strategy_names());
+  command.add_option("--pattern", options->pattern, "Sampling pattern of a pixel (default: the scene's)")
+      .is_member(reference::pattern_names());
   command
-      ->add_option("--from", options->from,
-                   "Trace paths from the camera, or from the lamps. lamps-swapped assumes that models are reciprocal;\n"
-                   "the picture then shows those that are not")
-      ->check(CLI::IsMember({"camera", "lamps", "lamps-swapped"}))
-      ->capture_default_str();
-  command->add_option("--preview", options->preview, "Also write a PNG for display");
-  command->add_option(
+      .add_option("--from", options->from,
+                  "Trace paths from the camera, or from the lamps. lamps-swapped assumes that models are reciprocal;\n"
+                  "the picture then shows those that are not")
+      .is_member({"camera", "lamps", "lamps-swapped"})
+      .capture_default_str();
+  command.add_option("--preview", options->preview, "Also write a PNG for display");
+  command.add_option(
       "--view", options->view,
       "View transform of the preview, from the OpenColorIO configuration that the environment variable OCIO\n"
       "names, for example AgX in Blender's (default: Standard, or the display's default if there is none)");
-  add_number(*command, "--exposure", options->exposure, {-64, 64}, "Exposure of the preview in stops");
-  command->callback([options] {
+  add_number(command, "--exposure", options->exposure, {-64, 64}, "Exposure of the preview in stops");
+  command.callback([options] {
     const std::filesystem::path out(options->out);
     if (out.extension() != ".exr") input_error("--out {}: expected a file name that ends in .exr", out.string());
     if (!options->preview.empty() && std::filesystem::path(options->preview).extension() != ".png")

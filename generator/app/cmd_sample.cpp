@@ -26,7 +26,7 @@ void write_sample(const measure::BoundModel& bound, const std::string& where, co
 
 }  // namespace
 
-void add_sample_command(CLI::App& app) {
+void add_sample_command(Command app) {
   struct Options {
     std::string model;
     std::vector<std::string> values;
@@ -36,24 +36,24 @@ void add_sample_command(CLI::App& app) {
     std::string pattern = "random";
   };
   auto o = std::make_shared<Options>();
-  CLI::App* cmd = app.add_subcommand(
+  const Command cmd = app.add_subcommand(
       "sample",
       "Directions sampled from the model, with their weights f cos / pdf and pdfs per solid angle.\n"
       "A sample with pdf 0 is lost (below the horizon); its weight is 0, and its direction (0, 0, 1) if wo is below.\n"
       "stdin:  CSV with header wo_x,wo_y,wo_z,u1,u2,u3 (0 <= u < 1), unless --count is given\n"
       "stdout: CSV with header wi_x,wi_y,wi_z,weight_r,weight_g,weight_b,pdf");
-  cmd->add_option("model", o->model, "Model, as in `brdfc list`")->required();
-  cmd->add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
-  CLI::Option* count =
-      add_number(*cmd, "--count", o->count, {.low = 1}, "Number of samples to draw with built-in random numbers");
-  add_number(*cmd, "--seed", o->seed, {}, "Seed of the random numbers")->needs(count);
-  cmd->add_option("--pattern", o->pattern,
-                  "Sampling pattern, as for the pixels of the reference renderer: random, regular, jittered,\n"
-                  "multi_jittered or hammersley")
-      ->check(CLI::IsMember(reference::pattern_names()))
-      ->needs(count);
-  add_numbers(*cmd, "--wo", o->wo, {}, "View direction x,y,z")->expected(3)->needs(count);
-  cmd->callback([o] {
+  cmd.add_option("model", o->model, "Model, as in `brdfc list`").required();
+  cmd.add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
+  const Option count =
+      add_number(cmd, "--count", o->count, {.low = 1}, "Number of samples to draw with built-in random numbers");
+  add_number(cmd, "--seed", o->seed, {}, "Seed of the random numbers").needs(count);
+  cmd.add_option("--pattern", o->pattern,
+                 "Sampling pattern, as for the pixels of the reference renderer: random, regular, jittered,\n"
+                 "multi_jittered or hammersley")
+      .is_member(reference::pattern_names())
+      .needs(count);
+  add_numbers(cmd, "--wo", o->wo, {}, "View direction x,y,z").expected(3).needs(count);
+  cmd.callback([o] {
     const Model& model = find_model(o->model);
     const measure::BoundModel bound = measure::bind_model(model, parse_values(model.info(), o->values));
     if (!model.has_scatter())

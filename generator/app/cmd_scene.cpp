@@ -7,16 +7,16 @@
 
 namespace brdfc::app {
 
-void add_scene_command(CLI::App& app) {
+void add_scene_command(Command app) {
   struct Options {
     std::string scene, out;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
+  const Command command = app.add_subcommand(
       "scene", "Write a scene with its meshes as .npy and its images as .exr, for a loader in another program");
-  command->add_option("SCENE", options->scene, "Scene file (.json)")->required();
-  command->add_option("--out", options->out, "Folder to write scene.json to")->required();
-  command->callback([options] {
+  command.add_option("SCENE", options->scene, "Scene file (.json)").required();
+  command.add_option("--out", options->out, "Folder to write scene.json to").required();
+  command.callback([options] {
     const reference::Scene scene = load_scene(options->scene);
     print_notes(scene.notes);
     reference::require_models(scene.materials);

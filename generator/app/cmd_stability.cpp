@@ -11,7 +11,7 @@
 
 namespace brdfc::app {
 
-void add_stability_command(CLI::App& app) {
+void add_stability_command(Command app) {
   struct Options {
     std::string model, page;
     measure::Hunt hunt;
@@ -19,20 +19,19 @@ void add_stability_command(CLI::App& app) {
     double limit = 32;
   };
   auto o = std::make_shared<Options>();
-  CLI::App* cmd = app.add_subcommand(
+  const Command cmd = app.add_subcommand(
       "stability",
       "Compares, over all parameters that models accept, double precision with 113 bits, and float and recorded\n"
       "programs with double; looks for invalid values (NaN, infinite, negative). Exit status 1 if a test fails.");
-  cmd->add_option("model", o->model, "Model, as in `brdfc list`; all models if omitted");
-  add_number(*cmd, "--points", o->hunt.points, {.low = 1},
-             "Points per model at which double is compared with 113 bits");
-  add_number(*cmd, "--calls", o->calls, {.low = 0},
+  cmd.add_option("model", o->model, "Model, as in `brdfc list`; all models if omitted");
+  add_number(cmd, "--points", o->hunt.points, {.low = 1}, "Points per model at which double is compared with 113 bits");
+  add_number(cmd, "--calls", o->calls, {.low = 0},
              "Evaluations and samples, over all models, to search for invalid values");
-  add_number(*cmd, "--limit", o->limit, {.low = 0},
+  add_number(cmd, "--limit", o->limit, {.low = 0},
              "Rounding that a formula may add to that of its inputs, in units of epsilon");
-  cmd->add_option("--page", o->page, "Folder for a page with maps of the errors");
-  add_number(*cmd, "--seed", o->hunt.seed, {}, "Seed of parameters and directions");
-  cmd->callback([o] {
+  cmd.add_option("--page", o->page, "Folder for a page with maps of the errors");
+  add_number(cmd, "--seed", o->hunt.seed, {}, "Seed of parameters and directions");
+  cmd.callback([o] {
     const std::vector<const Model*> chosen = models_named(o->model);
     int failed = 0;
     for (const Model* m : chosen) {

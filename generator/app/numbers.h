@@ -37,52 +37,52 @@ template <OptionNumber N> struct Accepted {
   }
 };
 
-/// Converts the whole text to a number. Throws CLI::ValidationError, which names the option.
+/// Converts the whole text to a number. Refuses any other text with a message that names the option.
 template <OptionNumber N>
 N accepted_number(const std::string& option, std::string_view text, const Accepted<N>& range) {
   const bool has_unit = range.unit != 0 && text.ends_with(range.unit);
   const std::optional<N> number = parse<N>(text.substr(0, text.size() - has_unit));
   const bool finite = number && std::isfinite(double(*number));
   if (!finite || !(*number >= range.low && *number <= range.high) || (range.above_low && *number == range.low))
-    throw CLI::ValidationError(option, fmt::format("expected {}, got '{}'", range.text(), text));
+    refuse(option, fmt::format("expected {}, got '{}'", range.text(), text));
   return *number;
 }
 
 namespace detail {
 
-template <OptionNumber N> CLI::Option* described(CLI::Option* option) {
-  return option->type_name(std::integral<N> ? "INTEGER" : "NUMBER");
+template <OptionNumber N> Option described(Option option) {
+  return option.type_name(std::integral<N> ? "INTEGER" : "NUMBER");
 }
 
 }  // namespace detail
 
 /// Adds an option that takes one number.
-template <OptionNumber N> CLI::Option* add_number(CLI::App& command, const std::string& name, N& value,
-                                                  const Accepted<N>& range, const std::string& doc) {
-  CLI::Option* option = command.add_option_function<std::string>(
+template <OptionNumber N> Option add_number(Command command, const std::string& name, N& value,
+                                            const Accepted<N>& range, const std::string& doc) {
+  Option option = command.add_option_function(
       name, [&value, name, range](const std::string& text) { value = accepted_number(name, text, range); }, doc);
-  option->default_function([&value] { return fmt::format("{}", value); });
+  option.default_function([&value] { return fmt::format("{}", value); });
   return detail::described<N>(option);
 }
 
 /// The same for an optional number, which shows whether the option was given.
-template <OptionNumber N> CLI::Option* add_number(CLI::App& command, const std::string& name, std::optional<N>& value,
-                                                  const Accepted<N>& range, const std::string& doc) {
-  return detail::described<N>(command.add_option_function<std::string>(
+template <OptionNumber N> Option add_number(Command command, const std::string& name, std::optional<N>& value,
+                                            const Accepted<N>& range, const std::string& doc) {
+  return detail::described<N>(command.add_option_function(
       name, [&value, name, range](const std::string& text) { value = accepted_number(name, text, range); }, doc));
 }
 
 /// Adds an option that takes several numbers, separated by commas.
-template <OptionNumber N> CLI::Option* add_numbers(CLI::App& command, const std::string& name, std::vector<N>& values,
-                                                   const Accepted<N>& range, const std::string& doc) {
-  CLI::Option* option = command.add_option_function<std::vector<std::string>>(
+template <OptionNumber N> Option add_numbers(Command command, const std::string& name, std::vector<N>& values,
+                                             const Accepted<N>& range, const std::string& doc) {
+  Option option = command.add_option_function(
       name,
       [&values, name, range](const std::vector<std::string>& texts) {
         values.clear();
         for (const std::string& text : texts) values.push_back(accepted_number(name, text, range));
       },
       doc);
-  return detail::described<N>(option->delimiter(','));
+  return detail::described<N>(option.delimiter(','));
 }
 
 }  // namespace brdfc::app

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/json_text.h"
 #include "tables/table_file.h"
 
 namespace brdfc::fit {
@@ -78,7 +79,7 @@ void write_fit(const FitTables& fit, const Model& model, const ParamValues& valu
   // The scale differs from 1 only for fits with factors other than 1.
   if (fit.scale != 1) meta["scale"] = fit.scale;
   TableImage image = image_of(pointers);
-  image.meta = meta.dump();
+  image.meta = json_text(meta);
   write_table_image(image, path);
 }
 
@@ -89,9 +90,9 @@ FitTables read_fit(const std::optional<FitAxis>& axis, const Terms& all_terms, c
   fit.terms = all_terms;
   const TableImage image = read_table_image(path);
   try {
-    const auto meta = nlohmann::json::parse(image.meta);
+    const auto meta = json_of_text(image.meta);
     if (meta.at("hash") != hash)
-      input_error("{}: hash: expected {}, got {}", path.string(), hash, meta.at("hash").dump());
+      input_error("{}: hash: expected {}, got {}", path.string(), hash, json_text(meta.at("hash")));
     std::map<std::string, TablePtr> tables;
     for (const auto& t : meta.at("tables")) {
       const auto sizes = t.at("sizes").get<std::vector<int>>();
@@ -99,7 +100,8 @@ FitTables read_fit(const std::optional<FitAxis>& axis, const Terms& all_terms, c
       for (const int n : sizes) count *= std::size_t(n);
       const std::string name = t.at("name");
       std::optional<std::vector<double>> values = values_in(image, t.at("row"), count, 1);
-      if (!values) input_error("{}: tables: {} has more numbers than there are", path.string(), t.at("name").dump());
+      if (!values)
+        input_error("{}: tables: {} has more numbers than there are", path.string(), json_text(t.at("name")));
       tables[name] = make_table(name, fit_axes(name, sizes, axis.has_value()), std::move(*values));
     }
     fit.knots = meta.at("knots").get<std::vector<double>>();

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "core/error.h"
+#include "core/json_text.h"
 #include "fit/roles.h"
 #include "fit/settings.h"
 #include "fit/twin.h"
@@ -81,16 +82,16 @@ void Twin::write(const Model& model, const ParamValues& given, const std::filesy
                      {"layout", "a row a table: row-major, first axis slowest, padded with zeros"},
                      {"tables", names}};
   TableImage image = image_of(rows);
-  image.meta = meta.dump();
+  image.meta = json_text(meta);
   write_table_image(image, path);
 }
 
 void Twin::read(const std::string& hash, const std::filesystem::path& path) {
   const TableImage image = read_table_image(path);
   try {
-    const auto meta = nlohmann::json::parse(image.meta);
+    const auto meta = json_of_text(image.meta);
     if (meta.at("hash") != hash)
-      input_error("{}: hash: expected {}, got {}", path.string(), hash, meta.at("hash").dump());
+      input_error("{}: hash: expected {}, got {}", path.string(), hash, json_text(meta.at("hash")));
     const auto names = meta.at("tables").get<std::vector<std::string>>();
     const std::size_t terms = meta.at("terms"), channels = meta.at("channels");
     if (terms != terms_.terms.size()) input_error("{}: terms: expected {}", path.string(), terms_.terms.size());

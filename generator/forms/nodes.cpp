@@ -9,6 +9,7 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
+#include "core/json_text.h"
 #include "forms/error.h"
 #include "forms/form.h"
 #include "forms/node_choices.h"
@@ -305,7 +306,7 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
   out.closures = int(first.closures.size() + first.of_base.size()) + int(parts.contains("draw")) + out.lamps;
   // The extension subtracts the slots of lamps that are not in use, with the count per lamp that other forms have.
   out.slots = out.closures - out.lamps + out.lamps * slots(ClosureKind::PhongRamp);
-  out.source = Json{{"format", 5},
+  const Json source{{"format", 5},
                     {"isotropic", model.info().properties.isotropic},
                     {"narrow", kNarrow},
                     {"widest", kWidestWidened},
@@ -313,9 +314,8 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
                     {"bounds", bounds},
                     {"closures", first.closures},
                     {"base", first.of_base},
-                    {"parts", parts}}
-                   .dump() +
-               "\n";
+                    {"parts", parts}};
+  out.source = json_text(source) + "\n";
   return out;
 }
 

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "core/json_text.h"
 #include "fit/roles.h"
 #include "forms/made_of_fit.h"
 
@@ -135,16 +136,15 @@ Shader Twin::write(const Model& model, const measure::AlbedoTable&, const Settin
                                 {"high", axis->high},
                                 {"scale", name_of(axis->scale)}}
                          : Json();
-  out.source = Json{{"format", 2},
+  const Json source{{"format", 2},
                     {"axis", over},
                     {"mixed", twin.terms().parameters},
                     {"terms", polynomials(twin.terms())},
                     {"mirror_terms", model.has_mirror() ? polynomials(twin.mirror_terms()) : Json::array()},
                     {"tint", {tint.r, tint.g, tint.b}},
                     {"closures", closures},
-                    {"albedo", by_term(twin.albedo())}}
-                   .dump() +
-               "\n";
+                    {"albedo", by_term(twin.albedo())}};
+  out.source = json_text(source) + "\n";
   return out;
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/json_text.h"
 #include "tables/table_file.h"
 
 namespace brdfc::measure {
@@ -50,7 +51,7 @@ void write_albedo_exr(const AlbedoTable& table, const std::filesystem::path& pat
                   {"terms", terms},
                   {"grids", grids}};
   TableImage image = image_of(rows);
-  image.meta = meta.dump();
+  image.meta = json_text(meta);
   write_table_image(image, path);
 }
 
@@ -58,7 +59,7 @@ AlbedoTable read_albedo_exr(const std::filesystem::path& path) {
   const TableImage image = read_table_image(path);
   AlbedoTable table;
   try {
-    const auto meta = nlohmann::json::parse(image.meta);
+    const auto meta = json_of_text(image.meta);
     table.model = meta.at("model");
     table.doc = meta.at("doc");
     table.error = meta.at("error");

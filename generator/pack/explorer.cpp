@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "core/json_text.h"
 #include "pack/addon.h"
 #include "pack/manifest.h"
 #include "pack/recorded_model.h"
@@ -21,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using print::GlslArgument;
 
-constexpr const char* kMadeBy = "// Made by brdfc ";
+constexpr const char* kScriptMadeBy = "// Made by brdfc ";
 
 /// Little-endian floats in base64, which JavaScript decodes to the same bits.
 std::string base64(const std::vector<double>& values) {
@@ -37,9 +38,9 @@ std::string base64(const std::vector<double>& values) {
 }
 
 /// The GLSL functions of a model; functions with the same text are written once.
-class Functions {
+class GlslFunctions {
  public:
-  Functions(const Model& model, print::Tables& tables) : model_(model), tables_(tables) {
+  GlslFunctions(const Model& model, print::Tables& tables) : model_(model), tables_(tables) {
     for (const ParamInfo& p : model.info().params)
       if (p.kind != ParamKind::Choice)
         parameters_.push_back({p.name, p.kind == ParamKind::Color ? ExprType::Color : ExprType::Real});
@@ -105,7 +106,7 @@ Json described(const Model& model, print::Tables& tables) {
   const ModelInfo& info = model.info();
   Json parameters = Json::array(), formulas = Json::object();
   for (const ParamInfo& p : info.params) parameters.push_back(parameter_json(p));
-  Functions functions(model, tables);
+  GlslFunctions functions(model, tables);
   for (const Choices& choices : choice_combinations(info)) {
     const std::vector<std::string> options = options_of(info, choices);
     const std::string key = fmt::format("{}", fmt::join(options, " "));
@@ -147,10 +148,10 @@ std::map<std::string, std::string> explorer_page(const std::vector<const Model*>
   for (const Model* model : models) described_models[model->info().name] = described(*model, tables);
   for (const auto& [name, table] : tables) described_tables[name] = base64(table->values);
   std::string& text = files["models.js"];
-  text = std::string("// SPDX-License-Identifier: GPL-3.0-or-later\n") + kMadeBy +
+  text = std::string("// SPDX-License-Identifier: GPL-3.0-or-later\n") + kScriptMadeBy +
          BRDFC_VERSION " of the formulas in C++: changes belong there.\n";
   const auto add = [&](const char* name, const Json& value) {
-    text.append("BRDFC.").append(name).append(" = ").append(value.dump()).append(";\n");
+    text.append("BRDFC.").append(name).append(" = ").append(json_text(value)).append(";\n");
   };
   text += "\"use strict\";\nconst BRDFC = {};\n";
   add("version", BRDFC_VERSION);
@@ -161,6 +162,6 @@ std::map<std::string, std::string> explorer_page(const std::vector<const Model*>
   return files;
 }
 
-void require_explorer(const fs::path& folder) { require_replaceable(folder, "models.js", kMadeBy); }
+void require_explorer(const fs::path& folder) { require_replaceable(folder, "models.js", kScriptMadeBy); }
 
 }  // namespace brdfc::pack

@@ -9,6 +9,7 @@
 #include <mutex>
 
 #include "core/hash.h"
+#include "core/json_text.h"
 #include "core/parse.h"
 #include "core/process.h"
 #include "fit/fit.h"
@@ -232,7 +233,7 @@ Result build_pack(const Options& options) {
   std::string everything;
   for (const auto& [name, data] : members) everything += name + '\0' + data;
   manifest["hash"] = sha256(everything);
-  members["manifest.json"] = manifest.dump(1) + "\n";
+  members["manifest.json"] = json_text(manifest, 1) + "\n";
 
   const fs::path folder = staging.path() / kFolder;
   for (const auto& [name, data] : members) write_text(folder / name, data);

@@ -22,8 +22,8 @@ namespace fs = std::filesystem;
 using print::python_number;
 using print::python_string;
 
-constexpr const char* kMadeBy = "# Made by brdfc ";
-const std::string kHead = std::string("# SPDX-License-Identifier: GPL-3.0-or-later\n") + kMadeBy +
+constexpr const char* kPythonMadeBy = "# Made by brdfc ";
+const std::string kHead = std::string("# SPDX-License-Identifier: GPL-3.0-or-later\n") + kPythonMadeBy +
                           BRDFC_VERSION " of the formulas in C++: changes belong there.\n";
 
 std::string color(const std::array<double, 3>& c) {
@@ -76,9 +76,9 @@ std::string class_name(const std::string& name) {
 }
 
 /// The functions of a module; functions with the same text are written once.
-class Functions {
+class NumpyFunctions {
  public:
-  explicit Functions(const Model& model) : model_(model) {
+  explicit NumpyFunctions(const Model& model) : model_(model) {
     for (const ParamInfo& p : model.info().params)
       if (p.kind != ParamKind::Choice) parameters_.push_back(p.name);
   }
@@ -125,7 +125,7 @@ class Functions {
 
 std::string module_of(const Model& model) {
   const ModelInfo& info = model.info();
-  Functions functions(model);
+  NumpyFunctions functions(model);
   std::string formulas;
   for (const Choices& choices : choice_combinations(info)) {
     std::string key;
@@ -233,7 +233,7 @@ std::map<std::string, std::string> python_package(const std::vector<const Model*
   return files;
 }
 
-void require_package(const fs::path& folder) { require_replaceable(folder, "_version.py", kMadeBy); }
+void require_package(const fs::path& folder) { require_replaceable(folder, "_version.py", kPythonMadeBy); }
 
 std::string closures_module() {
   std::string out = kHead + "\"\"\"What closures of Cycles scatter.\"\"\"\n";

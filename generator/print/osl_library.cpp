@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "print/osl_library.h"
 
-#include <regex>
+#include <cctype>
 #include <set>
 #include <stdexcept>
+#include <string_view>
 #include <vector>
 
 #include "print/osl_library_text.h"
@@ -14,6 +15,21 @@ namespace {
 struct Function {
   std::string name, text;  // the text includes the comment above the function
 };
+
+constexpr std::string_view kPrefix = "brdfc_";
+
+/// The names that begin with the prefix and that a parenthesis follows, in order.
+std::vector<std::string> names_in(const std::string& text) {
+  const auto in_word = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; };
+  std::vector<std::string> names;
+  for (std::size_t at = text.find(kPrefix); at != std::string::npos; at = text.find(kPrefix, at + 1)) {
+    std::size_t end = at;
+    while (end < text.size() && in_word(text[end])) ++end;
+    if ((at == 0 || !in_word(text[at - 1])) && end < text.size() && text[end] == '(')
+      names.push_back(text.substr(at, end - at));
+  }
+  return names;
+}
 
 /// Splits the library into its functions, each with the comment in front of it. A function ends with a line "}".
 std::vector<Function> parse_library() {
@@ -26,20 +42,18 @@ std::vector<Function> parse_library() {
     std::string text = library.substr(start, end + 3 - start);
     start = end + 3;
     while (!text.empty() && text.front() == '\n') text.erase(0, 1);
-    std::smatch match;
-    if (!std::regex_search(text, match, std::regex(R"((?:^|\n)[a-z][a-z ]* (brdfc_\w+)\()")))
-      throw std::logic_error("OSL library: a paragraph without a function");
-    functions.push_back({match[1], text});
+    std::size_t line = 0;
+    while (text.compare(line, 2, "//") == 0) line = text.find('\n', line) + 1;
+    const std::vector<std::string> names = names_in(text.substr(line, text.find('\n', line) - line));
+    if (names.empty()) throw std::logic_error("OSL library: a paragraph without a function");
+    functions.push_back({names.front(), text});
   }
   return functions;
 }
 
 std::set<std::string> calls_in(const std::string& text) {
-  std::set<std::string> names;
-  static const std::regex call(R"(\b(brdfc_\w+)\()");
-  for (auto it = std::sregex_iterator(text.begin(), text.end(), call); it != std::sregex_iterator(); ++it)
-    names.insert((*it)[1]);
-  return names;
+  const std::vector<std::string> names = names_in(text);
+  return {names.begin(), names.end()};
 }
 
 }  // namespace

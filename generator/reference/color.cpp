@@ -11,7 +11,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <map>
-#include <regex>
+#include <string_view>
 
 #include "core/data_dir.h"
 #include "core/error.h"
@@ -29,10 +29,15 @@ constexpr const char* kBuiltIn = "ocio://";
 /// The version that a configuration file states; empty if it states none.
 std::string stated_version(const fs::path& file) {
   std::ifstream in(file);
-  static const std::regex line_of_version(R"(^\s*ocio_profile_version:\s*([0-9.]+))");
-  std::smatch found;
-  for (std::string line; std::getline(in, line);)
-    if (std::regex_search(line, found, line_of_version)) return found[1];
+  constexpr std::string_view kKey = "ocio_profile_version:";
+  constexpr const char* kSpace = " \t\r\v\f";
+  for (std::string line; std::getline(in, line);) {
+    line.erase(0, line.find_first_not_of(kSpace));
+    if (!line.starts_with(kKey)) continue;
+    line.erase(0, line.find_first_not_of(kSpace, kKey.size()));
+    line.resize(std::min(line.size(), line.find_first_not_of("0123456789.")));
+    if (!line.empty()) return line;
+  }
   return {};
 }
 

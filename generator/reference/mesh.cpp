@@ -5,9 +5,11 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <regex>
+#include <optional>
+#include <string_view>
 
 #include "core/error.h"
+#include "core/parse.h"
 #include "reference/image.h"
 
 namespace brdfc::reference {
@@ -45,12 +47,27 @@ template <> const char* npy_type<std::int32_t>() { return "<i4"; }
 
 constexpr char kMagic[] = "\x93NUMPY\x01\x00";
 
+/// A header is this, the numbers of rows and columns with a comma between them, the end, and white space.
+template <class T> std::string header_start() {
+  return fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': (", npy_type<T>());
+}
+constexpr const char* kHeaderEnd = "), }";
+
+/// The number of rows of an array with this many columns; nullopt if the header is another one.
+template <class T> std::optional<std::size_t> rows_stated(std::string_view header, std::size_t columns) {
+  const std::string start = header_start<T>(), end = fmt::format(", {}{}", columns, kHeaderEnd);
+  header = header.substr(0, header.find_last_not_of(" \t\n\r\v\f") + 1);
+  if (!header.starts_with(start) || !header.ends_with(end) || header.size() < start.size() + end.size()) return {};
+  header.remove_prefix(start.size());
+  header.remove_suffix(end.size());
+  return header.size() <= 9 ? parse<std::size_t>(header) : std::nullopt;
+}
+
 }  // namespace
 
 template <class T>
 void write_npy(const std::filesystem::path& path, const T* data, std::size_t rows, std::size_t columns) {
-  std::string header =
-      fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}, {}), }}", npy_type<T>(), rows, columns);
+  std::string header = fmt::format("{}{}, {}{}", header_start<T>(), rows, columns, kHeaderEnd);
   header.append(63 - (10 + header.size()) % 64, ' ');  // pads the header: the data start at a multiple of 64 bytes
   header += '\n';
   write_beside(path, [&](const std::filesystem::path& temporary) {
@@ -77,13 +94,9 @@ template <class T> std::vector<T> read_npy(const std::filesystem::path& path, st
   if (!in || std::memcmp(magic, kMagic, 8) != 0) input_error("{}: not a .npy file of version 1.0, {}", name, expected);
   std::string header(length, ' ');
   in.read(header.data(), length);
-  static const std::regex form(
-      R"(\{'descr': '(.*)', 'fortran_order': (True|False), 'shape': \((\d{1,9}), (\d{1,9})\), \}\s*)");
-  std::smatch match;
-  if (!in || !std::regex_match(header, match, form) || match[1] != npy_type<T>() || match[2] != "False" ||
-      std::stoul(match[4]) != columns)
-    input_error("{}: {}", name, expected);
-  const std::size_t rows = std::stoul(match[3]);
+  const std::optional<std::size_t> stated = rows_stated<T>(header, columns);
+  if (!in || !stated) input_error("{}: {}", name, expected);
+  const std::size_t rows = *stated;
   const std::size_t bytes = rows * columns * sizeof(T);
   if (std::filesystem::file_size(path) != 10 + length + bytes)
     input_error("{}: {} rows need {} bytes of data, the file has {}", name, rows, bytes,

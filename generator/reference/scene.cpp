@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "core/json_text.h"
 #include "reference/json_view.h"
 #include "reference/procedural.h"
 #include "reference/scene_files.h"
@@ -48,7 +49,7 @@ class Loader {
       for (const JsonView& light : lights->elements()) read_light(light, files_);
     read_environment(root.find("environment"), files_);
 
-    scene_.hash = short_hash(scene_.resolved.dump());
+    scene_.hash = short_hash(json_text(scene_.resolved));
     if (!scene_.description.empty()) scene_.resolved["description"] = scene_.description;
     if (const auto settings = root.find("settings")) read_settings(*settings);
     const RenderSettings& s = scene_.settings;
@@ -150,7 +151,7 @@ void write_resolved(const Scene& scene, const fs::path& folder) {
   for (const auto& [name, image] : scene.image_files) write_image(folder / name, *image);
   write_beside(folder / "scene.json", [&](const fs::path& temporary) {
     std::ofstream out(temporary);
-    out << scene.resolved.dump(2) << '\n';
+    out << json_text(scene.resolved, 2) << '\n';
     out.close();
     if (!out) input_error("{}: can't write", (folder / "scene.json").string());
   });

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "core/json_text.h"
 #include "reference/scene_files.h"
 #include "reference/shape_reader.h"
 
@@ -56,7 +57,7 @@ class ObjectReader {
 
   /// Shapes with the same JSON text are read or made once.
   const Shape& read_shape(const JsonView& j) {
-    const std::string text = j.json().dump();
+    const std::string text = json_text(j.json());
     if (const auto known = shapes_.find(text); known != shapes_.end()) return known->second;
     std::vector<std::string> types = shape_types();
     types.push_back("mesh");

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "core/json_text.h"
 #include "reference/image.h"
 #include "report/report.h"
 
@@ -84,7 +85,7 @@ std::string report_json(const std::vector<SceneReport>& scenes) {
          {"provenance", s.provenance},
          {"commands", s.commands}});
   }
-  return out.dump(2) + "\n";
+  return json_text(out, 2) + "\n";
 }
 
 std::string report_csv(const std::vector<SceneReport>& scenes) {
