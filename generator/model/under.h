@@ -61,7 +61,7 @@ Closure<T> narrower_facets(const Rgb<T>& weight, const T& ax, const T& ay, const
 /// for slopes from 0.01 to 1. The constants were found by bisection for Ward's and Cook and Torrance's models.
 template <class T> T narrow_towards_horizon(const T& a, const Vec3<T>& wo) {
   const T x2 = sqr(a / wo.z);
-  return T(3.8) * x2 / (T(1) + T(2) * x2);
+  return T(4.2) * x2 / (T(1) + T(2) * x2);
 }
 
 namespace detail {
