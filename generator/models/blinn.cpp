@@ -53,11 +53,11 @@ template <class T> struct Blinn {
 
   T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
     const HalfVector<T> k(wi, wo);
-    return select(above(wi, wo), v_cavity_pdf(k, D(k.h), wo), T(0));
+    return select(above(wi, wo), v_cavity_pdf(k, D(k.h)), T(0));
   }
 
   Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
-    const Vec3<T> h = visible_side(sample_power_lobe(e + T(1), u.y, u.z), wo, u.x);
+    const Vec3<T> h = sample_power_lobe(e + T(1), u.y, u.z);
     const T oh = named("oh", dot(wo, h));
     const Vec3<T> wi = h * (T(2) * oh) - wo;
     return sample_if(above(wi, wo), wi, ks * v_cavity_weight(h, oh, wi, wo), pdf(wi, wo));
@@ -74,6 +74,16 @@ template <class T> struct Blinn {
   ClosureSum<T> under(const Vec3<T>& wo) const {
     const T alpha = sqrt(T(2) / (e + T(2))), narrow = sqr(alpha) + narrow_towards_horizon(alpha, wo);
     return {narrower_facets(ks, alpha, alpha, narrow, narrow)};
+  }
+
+  /// Visible microfacets.
+  Sample<T> sample_beside_under(const Vec3<T>& wo, const Vec3<T>& u, const T&) const {
+    const Vec3<T> h = visible_side(sample_power_lobe(e + T(1), u.y, u.z), wo, u.x);
+    const T oh = named("oh", dot(wo, h));
+    const Vec3<T> wi = h * (T(2) * oh) - wo;
+    const HalfVector<T> k(wi, wo);
+    return sample_if(above(wi, wo), wi, ks * visible_side_weight(h, oh, wi, wo),
+                     select(above(wi, wo), visible_side_pdf(k, D(k.h), wo), T(0)));
   }
 };
 

@@ -57,11 +57,11 @@ template <class T> struct CookTorrance {
 
   T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
     const HalfVector<T> k(wi, wo);
-    return select(above(wi, wo), v_cavity_pdf(k, D(k.h), wo), T(0));
+    return select(above(wi, wo), v_cavity_pdf(k, D(k.h)), T(0));
   }
 
   Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
-    const Vec3<T> h = visible_side(sample_gaussian_slopes(m, m, u.y, u.z), wo, u.x);
+    const Vec3<T> h = sample_gaussian_slopes(m, m, u.y, u.z);
     const T oh = named("oh", dot(wo, h));
     const Vec3<T> wi = h * (T(2) * oh) - wo;
     return sample_if(above(wi, wo), wi, F(clamp01(T(1) - oh)) * v_cavity_weight(h, oh, wi, wo), pdf(wi, wo));
@@ -77,6 +77,16 @@ template <class T> struct CookTorrance {
   ClosureSum<T> under(const Vec3<T>& wo) const {
     const T narrow = narrow_towards_horizon(m, wo);
     return {narrower_facets(f0, m, m, narrow, narrow)};
+  }
+
+  /// Visible microfacets.
+  Sample<T> sample_beside_under(const Vec3<T>& wo, const Vec3<T>& u, const T&) const {
+    const Vec3<T> h = visible_side(sample_gaussian_slopes(m, m, u.y, u.z), wo, u.x);
+    const T oh = named("oh", dot(wo, h));
+    const Vec3<T> wi = h * (T(2) * oh) - wo;
+    const HalfVector<T> k(wi, wo);
+    return sample_if(above(wi, wo), wi, F(clamp01(T(1) - oh)) * visible_side_weight(h, oh, wi, wo),
+                     select(above(wi, wo), visible_side_pdf(k, D(k.h), wo), T(0)));
   }
 };
 

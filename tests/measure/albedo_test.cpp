@@ -127,14 +127,11 @@ TEST(Lobes, OfAChoiceThatDependsOnTheHalfVectorHaveNoCommonBorders) {
   EXPECT_GT(std::abs(one[1] - two[1]), 1e-3);
 }
 
-/// Where a cavity is seen from the side, the first number chooses the side of a microfacet that the others sample.
-TEST(Lobes, OfEveryModelAreToldButThoseOfCavities) {
+TEST(Lobes, OfEveryModelAreTold) {
   for (const auto& [name, model] : models()) {
     const BoundModel b = bind_model(*model, {});
-    const bool has_cavities = name == "blinn" || name == "cook_torrance";
     for (const double c : {1., 0.6, 0.05})
-      EXPECT_EQ(lobe_borders(*b.brdf, direction(c, 0.3)).empty(), has_cavities && c < 1)
-          << name << " cos_theta_o=" << c;
+      EXPECT_FALSE(lobe_borders(*b.brdf, direction(c, 0.3)).empty()) << name << " cos_theta_o=" << c;
   }
 }
 
