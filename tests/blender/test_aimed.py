@@ -76,12 +76,13 @@ def other_choices(extension, name, form):
     return [dict(zip(options, chosen, strict=True)) for chosen in combinations][1:]
 
 
-def off_under_a_sun(extension, scene, tool, form, towards, samples, few_of, pictures=1):
+def off_under_a_sun(extension, scene, tool, form, towards, samples, few_of, pictures=1, least=1e-6):
     """Renders a form under a sun without an angle and compares it with the formula.
 
     Returns [(model, values, relative L1, its noise, largest f cos)]: the error of the mean of
-    several pictures, and the error that their variance explains (0 for one picture). `scene` is in
-    the state of apply_clean_settings()."""
+    several pictures, and the error that their variance explains (0 for one picture). `least`: the
+    light of a facet below which errors count as parts of that. `scene` is in the state of
+    apply_clean_settings()."""
     rng = np.random.default_rng(17)
     cases = cases_of(extension, rng, form, few_of)
     which = np.repeat(np.arange(len(cases)), FACETS)
@@ -108,8 +109,7 @@ def off_under_a_sun(extension, scene, tool, form, towards, samples, few_of, pict
         # much brighter: such dots are noise. One facet in thirty may have one.
         error = np.abs(picture[lit] - expected).sum(1)
         kept = np.argsort(error)[: -(len(error) // 30)]
-        # Even pictures of 16 bits show no less light; closures of so little are kept too rarely.
-        by = max(expected.sum(), 2**-16 * len(expected))
+        by = max(expected.sum(), least * len(expected))
         off, noise = (x[kept].sum() / by for x in (error, spread[lit].sum(1)))
         print(f"{name} {values}: {off:.2g}, noise {noise:.2g}")
         found.append((name, values, off, noise, expected.max()))
