@@ -6,7 +6,7 @@
 // Lamps: Toon closures, constant over the lamp's cone or cones, with a part of the model's f cos at a random point of
 // the lamp. Rest: a direction drawn from the model. If it hits one of these lamps, it carries the other part of f cos.
 //
-// The two parts are those of multiple importance sampling (Veach and Guibas 1995, power heuristic with exponent 2). So
+// The two parts are those of multiple importance sampling (Veach and Guibas 1995, power heuristic, exponent 4). So
 // drawn directions find the highlight of a lobe that is narrow for its lamp, and the closure has the light of a lamp
 // that is small for the lobe. The two parts add up to f cos in every direction.
 //
@@ -215,10 +215,17 @@ template <class T> FlatPoint<T> flat_point(const LampSlot<T>& slot, const LampAx
 
 /// The part of f cos in one direction that the lamp's closure carries; the drawn direction carries the rest of it.
 /// `density`: pdf of drawn directions there. `emphasis`: 1 for a ball or a sun.
+///
+/// Cycles follows one closure at a time, so the part of a drawn direction is noisy unless it is small or nearly
+/// everything. The closure is only as noisy as f is uneven over the lamp. So it keeps its light until drawn directions
+/// hit the lamp so often that the lobe must be narrower than the lamp, and then gives it up quickly.
 template <class T> T part_of_lamp(const LampCone<T>& cone, const T& emphasis, const T& density) {
+  /// Where both carry one half: the density, in units of that of a uniform point of the lamp.
+  constexpr double kEqual = 2;
   // The point of a rectangle has the pdf 1 / (solid_angle emphasis), and since Cycles samples all of the rectangle,
   // only one sample in `emphasis` meets its cone.
-  return T(1) / (T(1) + sqr(density * (cone.solid_angle * sqr(emphasis))));
+  const T ratio = density * (cone.solid_angle * sqr(emphasis)) * T(1 / kEqual);
+  return T(1) / (T(1) + sqr(sqr(ratio)));
 }
 
 /// What the closure of a lamp carries of f cos in a drawn direction: part_of_lamp() if the direction hits the lamp or
