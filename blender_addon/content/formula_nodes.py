@@ -138,6 +138,7 @@ _SEEN = [
     ["solid_angle", "FLOAT"],
     ["chord", "FLOAT"],
     ["reach", "FLOAT"],
+    ["inner", "FLOAT"],
     ["flat", "FLOAT"],
     ["used", "FLOAT"],
     ["active", "FLOAT"],
@@ -255,9 +256,27 @@ def _same_plane(w, lamp, other):
     return w.math("MULTIPLY", same, w.math("GREATER_THAN", lamp["plane"], 0.5))
 
 
-def _keep_apart(w, lamps, widest):
-    """Decides which lamps get a closure, and how wide each may be. If two cones overlap, the lamp
-    with the earlier slot, which is the wider one, is left to random directions.
+class _Nearest:
+    """The later lamp that comes nearest to a lamp, in its direction and its radius; and how much
+    room these two, and the one that comes second, leave around the lamp's axis."""
+
+    def __init__(self, w):
+        self.w, self.room, self.second = w, _FAR, _FAR
+        self.towards, self.radius = (0.0, 0.0, 0.0), 0.0
+
+    def add(self, beside, towards, radius):
+        w = self.w
+        closer = w.math("LESS_THAN", beside, self.room)
+        self.second = w.math("MINIMUM", self.second, w.math("MAXIMUM", beside, self.room))
+        self.towards = w.mix(closer, self.towards, towards, True)
+        self.radius = w.mix(closer, self.radius, radius)
+        self.room = w.math("MINIMUM", self.room, beside)
+
+
+def _keep_apart(w, parts, lamps, at, widest):
+    """Decides which lamps get closures, where, and how wide each may be. If two cones overlap, the
+    lamp with the earlier slot, which is the wider one, gets a cone beside the other if it is flat
+    and the other is much smaller; otherwise it is left to random directions.
 
     Goes from the last slot to the first, so that the empty slots, which are constant to Cycles,
     come first.
@@ -270,19 +289,43 @@ def _keep_apart(w, lamps, widest):
             distance = w.vector("DISTANCE", lamp["towards"], other["towards"], output="Value")
             distance = w.mix(_same_plane(w, lamp, other), distance, _FAR)
             apart[i, j] = apart[j, i] = w.mix(other["used"], _FAR, distance)
-    for i, lamp in enumerate(lamps):
+    for i, lamp in reversed(list(enumerate(lamps))):
+        nearest = _Nearest(w)
+        for j in range(len(lamps) - 1, i, -1):
+            beside = w.math("SUBTRACT", apart[i, j], lamps[j]["taken"])
+            nearest.add(beside, lamps[j]["towards"], lamps[j]["as_other"])
+        free = w.math("LESS_THAN", lamp["reach"], nearest.room)
+        aside = _move_aside(w, parts, lamp, at, nearest)
+        shown = w.math("MULTIPLY", lamp["active"], w.math("MAXIMUM", free, aside))
+        lamp["shown"] = shown
+        lamp["lit"] = w.math("MULTIPLY", shown, lamp["above"])
+        # No cone can be beside a lamp that has no closure.
+        lamp["as_other"] = w.mix(shown, _FAR, lamp["reach"])
+        room = w.math("MINIMUM", nearest.room, widest)
+        for j in range(i - 1, -1, -1):
+            beside = w.math("SUBTRACT", apart[i, j], lamps[j]["taken"])
+            room = w.math("MINIMUM", room, beside)
+        lamp["room"] = room
 
-        def nearest(others, room, i=i):
-            for j in others:
-                beside = w.math("SUBTRACT", apart[i, j], lamps[j]["taken"])
-                room = w.math("MINIMUM", room, beside)
-            return room
 
-        later = nearest(range(len(lamps) - 1, i, -1), _FAR)
-        free = w.math("LESS_THAN", lamp["reach"], later)
-        lamp["shown"] = w.math("MULTIPLY", lamp["active"], free)
-        lamp["lit"] = w.math("MULTIPLY", lamp["shown"], lamp["above"])
-        lamp["room"] = nearest(range(i - 1, -1, -1), w.math("MINIMUM", later, widest))
+def _move_aside(w, parts, lamp, at, nearest):
+    """Gives a flat lamp a single cone beside the nearest later lamp, if they overlap; returns 1 if
+    it has that, otherwise 0."""
+    overlaps = w.math("LESS_THAN", nearest.room, lamp["reach"])
+    # Part of a lamp that the horizon cuts may be hidden: that is left to random directions.
+    whole = w.math("GREATER_THAN", lamp["clear"], w.math("SUBTRACT", lamp["count"], 0.01))
+    alone = w.math("LESS_THAN", lamp["reach"], nearest.second)
+    other = {"other": nearest.towards, "other_radius": nearest.radius}
+    made = parts.add("aside", at=at, **lamp, **other)
+    aside = w.math("MULTIPLY", lamp["flat"], overlaps)
+    for condition in (whole, alone, made["fits"]):
+        aside = w.math("MULTIPLY", aside, condition)
+    hit = w.math("GREATER_THAN", lamp["solid_angle"], 0.0)
+    new = {"count": 1.0, "clear": 1.0, "chord": made["chord"], "of_cones": made["of_cones"]}
+    new["solid_angle"] = w.math("MULTIPLY", made["of_cones"], hit)
+    lamp |= {name: w.mix(aside, lamp[name], value) for name, value in new.items()}
+    lamp[_CONES[0][0]] = w.mix(aside, lamp[_CONES[0][0]], made["axis"], True)
+    return aside
 
 
 def wire(tree, data, normal, tangent, parameters, outputs_of_slots, title):
@@ -369,7 +412,7 @@ def _wired(w, data, normal, tangent, parameters, of_slots, title):
         for slot in of_slots:
             values = dict(zip(_SLOT, slot, strict=True))
             lamps.append(values | add_group(w, seen, here | values, "lamp seen"))
-        _keep_apart(w, lamps, data["widest"])
+        _keep_apart(w, parts, lamps, surface.place, data["widest"])
     shaders.append(_rest(w, parts, surface, given, lamps, data["narrow"]))
     for lamp in lamps:
         shaders.append(add_group(w, lit, given | lamp, "lamp")["BSDF"])

@@ -15,8 +15,9 @@
 // looks longer from the shading point. They may overlap, since only their sum counts. All of them carry the same value,
 // so that the model's formula runs once. Cycles drops closures with a small weight, so the cone of a small lamp is
 // widened until it carries kWidened of the light; that share of the light beside the lamp then counts twice. If the
-// cones of two lamps overlap, the earlier lamp in the list, which is sorted by size with the widest first, is left to
-// drawn directions. Otherwise light in the overlap would count twice.
+// cones of two lamps overlap, light in the overlap would count twice. If one of them is a rectangle or an ellipse and
+// the other is much smaller, as the sun behind a window is, the wide one has a cone beside the small one (cone_aside).
+// Otherwise the earlier lamp in the list, which is sorted by size with the widest first, is left to drawn directions.
 //
 // The formulas run only as nodes (print/node_program.h), for which a division by 0 and the root of a negative number
 // give 0.
@@ -57,6 +58,7 @@ template <class T> LampAxes<T> lamp_axes(const LampSlot<T>& slot) {
 template <class T> struct LampCones {
   T count;
   T sine;       ///< of their radius
+  T alone;      ///< the sine of the radius of the largest cone about the middle of the lamp
   Vec3<T> row;  ///< half the distance between the middles of the first and the last
 };
 /// `centre`: from the shading point to the middle of the lamp. `many`: whether there may be more than one cone.
@@ -83,7 +85,9 @@ template <class T, class Bool> LampCones<T> cones_of_rectangle(const LampSlot<T>
   cones.row = select(a_is_longer, a, b) * moved;
   // All have the size of the farthest one.
   const T end2 = c2 + moved * (moved * select(a_is_longer, a2, b2) + T(2) * select(a_is_longer, ac, bc));
-  cones.sine = lamp.half_across * lamp.half_along * abs(dot(lamp.away, centre)) / sqrt(longer2 * end2);
+  const T volume = lamp.half_across * lamp.half_along * abs(dot(lamp.away, centre));
+  cones.sine = volume / sqrt(longer2 * end2);
+  cones.alone = volume / sqrt(longer2 * c2);
   return cones;
 }
 
@@ -97,6 +101,7 @@ template <class T> struct LampCone {
   T solid_angle;       ///< the same, or 0 for a lamp that drawn directions can't hit
   T chord;             ///< radius of the closure; for a ball or a sun it includes a seam
   T reach;             ///< radius of a cone around the whole lamp
+  T inner;             ///< radius of the largest cone about its middle that a flat lamp fills
   T flat;              ///< 1 for a rectangle or an ellipse, otherwise 0
   T used;              ///< 0 for an empty slot, otherwise 1
   T active;            ///< 0 for an empty slot and for a lamp that is left to drawn directions, otherwise 1
@@ -153,6 +158,8 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& slot, const LampAxes<T
   // The cones of a rectangle carry all of the rectangle's light, so they must not be widened.
   cone.chord = sqrt(T(2) * cone.drop) + select(flat, T(0), T(2 * kNarrow));
   cone.reach = select(flat, diagonal + T(2 * kNarrow), cone.chord);
+  const T inner2 = select(kind < T(3.5), sqr(cone.cones.alone), size2);
+  cone.inner = sqrt(T(2) * inner2 / (T(1) + sqrt(T(1) - inner2)));
   cone.flat = select(flat, T(1), T(0));
   cone.cones.sine = sqrt(sine2);
   const auto used = kind > T(0.5);
@@ -191,6 +198,52 @@ template <class T> T emphasis_at(const LampSlot<T>& slot, const LampAxes<T>& lam
   const auto round = slot.kind > T(3.5);
   const T area = lamp.half_across * lamp.half_along * select(round, T(kPi), T(4));
   return area * cosine / (distance2 * of_cones);
+}
+
+/// A cone within a flat lamp, beside a small lamp in front of it or behind it.
+template <class T> struct ConeAside {
+  Vec3<T> towards;  ///< unit vector along its axis
+  T chord;          ///< its radius
+  T of_cones;       ///< its solid angle, increased by the share of the flat lamp that the small one covers
+  T fits;           ///< 1 if the other lamp is small enough, otherwise 0
+};
+/// The part of a small disk of directions about `other` that lies within a rectangle or an ellipse.
+template <class T> T part_within(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
+                                 const Vec3<T>& other, const T& other_radius) {
+  const Vec3<T> centre = slot.place - at;
+  const T slope = dot(lamp.away, other), distance = dot(lamp.away, centre) / slope;
+  const Vec3<T> off = other * distance - centre;
+  const T diameter = T(2) * other_radius * distance;
+  const auto within = [&](const T& left) { return maximum(minimum(left / diameter + T(0.5), T(1)), T(0)); };
+  const T x = dot(off, lamp.across), y = dot(off, lamp.along);
+  const T of_rectangle = within(lamp.half_across - abs(x)) * within(lamp.half_along - abs(y));
+  const T from_middle = sqrt(sqr(x / lamp.half_across) + sqr(y / lamp.half_along));
+  const T of_ellipse = within((T(1) - from_middle) * minimum(lamp.half_across, lamp.half_along));
+  return select(T(0) < slope, select(slot.kind > T(3.5), of_ellipse, of_rectangle), T(0));
+}
+/// The largest disk within a disk of radius `inner` about `towards` that does not meet one of radius `other_radius`
+/// about `other`: it touches the rims of both. Radii and distances are chords.
+template <class T> ConeAside<T> cone_aside(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
+                                           const Vec3<T>& towards, const T& inner, const Vec3<T>& other,
+                                           const T& other_radius) {
+  /// Of the radius of the wide lamp, the largest radius that the small one may have.
+  constexpr double kSmall = 1.0 / 3;
+  /// Chords add up only approximately, and both lamps have a seam.
+  constexpr double kMargin = 0.97;
+  const Vec3<T> away = towards - other;
+  const T distance = length(away);
+  ConeAside<T> out;
+  out.chord = minimum((inner + distance - other_radius) / T(2), inner) * T(kMargin);
+  const Vec3<T> middle = towards + away * ((inner - out.chord) / distance);
+  out.towards = middle * (T(1) / length(middle));
+  // Light samples of the wide lamp that meet the cone of the small one have light there.
+  const Vec3<T> centre = slot.place - at;
+  const T distance2 = dot(centre, centre), facing = abs(dot(lamp.away, centre)) / sqrt(distance2);
+  const T whole = emphasis_at(slot, lamp, facing, distance2, T(1));
+  const T covered = part_within(slot, lamp, at, other, other_radius) * (sqr(other_radius) * T(kPi)) / whole;
+  out.of_cones = sqr(out.chord) * T(kPi) / (T(1) - covered);
+  out.fits = select(other_radius < inner * T(kSmall), T(1), T(0));
+  return out;
 }
 
 /// A point of a rectangle or an ellipse, chosen by two numbers in [0, 1).

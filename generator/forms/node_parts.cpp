@@ -39,9 +39,9 @@ LampAxes<Expr> axes_input() {
 }  // namespace
 
 const std::set<std::string>& node_vectors() {
-  static const std::set<std::string> names = {"across", "along", "at",   "away",  "axis",  "normal",
-                                              "place",  "ray",   "row",  "scale", "shape", "towards",
-                                              "true",   "turn",  "view", "wi",    "wo"};
+  static const std::set<std::string> names = {"across",  "along", "at",   "away", "axis",  "normal",
+                                              "other",   "place", "ray",  "row",  "scale", "shape",
+                                              "towards", "true",  "turn", "view", "wi",    "wo"};
   return names;
 }
 
@@ -87,6 +87,7 @@ NodeProgram record_cone() {
     p.output("solid_angle", cone.solid_angle);
     p.output("chord", cone.chord);
     p.output("reach", cone.reach);
+    p.output("inner", cone.inner);
     p.output("flat", cone.flat);
     p.output("used", cone.used);
     p.output("active", cone.active);
@@ -100,10 +101,20 @@ NodeProgram record_cone_at() {
   return recorded([](Program& p) {
     LampCone<Expr> cone;
     cone.towards = input3("towards");
-    cone.cones = {Expr::input("count"), Expr::input("sine"), input3("row")};
+    cone.cones = {Expr::input("count"), Expr::input("sine"), Expr(0.0), input3("row")};
     const ConeAt<Expr> one = cone_at(slot_input(), cone, input3("at"), Expr::input("index"), input3("normal"));
     p.output("axis", one.towards);
     p.output("clear", one.clear);
+  });
+}
+NodeProgram record_aside() {
+  return recorded([](Program& p) {
+    const ConeAside<Expr> aside = cone_aside(slot_input(), axes_input(), input3("at"), input3("towards"),
+                                             Expr::input("inner"), input3("other"), Expr::input("other_radius"));
+    p.output("axis", aside.towards);
+    p.output("chord", aside.chord);
+    p.output("of_cones", aside.of_cones);
+    p.output("fits", aside.fits);
   });
 }
 NodeProgram record_flat() {

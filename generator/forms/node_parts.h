@@ -20,6 +20,7 @@ print::NodeProgram record_axes();
 print::NodeProgram record_cone();
 /// The cone of a lamp with this index.
 print::NodeProgram record_cone_at();
+print::NodeProgram record_aside();
 print::NodeProgram record_flat();
 print::NodeProgram record_met();
 print::NodeProgram record_lobe();

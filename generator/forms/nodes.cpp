@@ -298,6 +298,7 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
     add("axes", record_axes());
     add("cone", record_cone());
     add("cone_at", record_cone_at());
+    add("aside", record_aside());
     add("flat", record_flat());
     add("met", record_met());
     add("lobe", record_lobe());
