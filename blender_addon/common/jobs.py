@@ -3,6 +3,7 @@
 bpy."""
 
 import contextlib
+import os
 import subprocess
 import tempfile
 from pathlib import Path
@@ -55,9 +56,10 @@ class ProgramJob(Job):
         self._log_file = folder / "log.txt"
         return folder
 
-    def _start(self, command, output=None):
+    def _start(self, command, output=None, environment=()):
         """Starts the program. Its output goes to the log; if a file is given for stdout, only
-        stderr does. Raises OSError after removing the folder."""
+        stderr does. `environment`: variables that are added. Raises OSError after removing the
+        folder."""
         try:
             with contextlib.ExitStack() as files:
                 log = files.enter_context(self._log_file.open("wb"))
@@ -67,6 +69,7 @@ class ProgramJob(Job):
                     stdin=subprocess.DEVNULL,
                     stdout=said,
                     stderr=log,
+                    env=os.environ | dict(environment),
                     # Keeps Windows from opening a console window.
                     creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
                 )

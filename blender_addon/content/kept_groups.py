@@ -16,6 +16,9 @@ import bpy
 from ..common.extension import PACKAGE, ROOT
 
 _ENDING = ".blend"
+#: Environment variable that names the cache folder for a second Blender, in which the package has
+#: a name of its own.
+FOLDER = "BRDFC_KEPT_NODES"
 
 
 @functools.cache
@@ -29,7 +32,17 @@ def version():
 
 def _folder():
     """Path of the cache folder, which is made if missing. Raises OSError or ValueError."""
+    if given := os.environ.get(FOLDER):
+        return Path(given)
     return Path(bpy.utils.extension_path_user(PACKAGE, path="nodes", create=True))
+
+
+def environment():
+    """What a second Blender needs in its environment to use this cache."""
+    try:
+        return {FOLDER: str(_folder())}
+    except (OSError, ValueError):
+        return {}
 
 
 def _name(digest):

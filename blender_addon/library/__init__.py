@@ -21,6 +21,7 @@ import bpy
 from ..common.extension import PACKAGE
 from ..common.i18n import say
 from ..common.jobs import ProgramJob
+from ..content import kept_groups
 from ..packs import pack
 
 _HERE = Path(__file__).parent
@@ -210,7 +211,7 @@ class Making(ProgramJob):
         self._made.mkdir()
         command = build_command(str(self._made))
         try:
-            self._start(command)
+            self._start(command, environment=kept_groups.environment())
         except OSError as failed:
             raise LibraryError(
                 say("The library of materials could not be made", f"{command[0]}: {failed}")

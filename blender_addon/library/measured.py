@@ -20,6 +20,7 @@ from ..common.files import beside
 from ..common.i18n import say
 from ..common.jobs import Job, ProgramJob
 from ..common.program import find
+from ..content import kept_groups
 from ..measured import ENDINGS, SUM, Fitting, MeasuredError
 from ..packs import pack
 from . import (
@@ -210,7 +211,7 @@ class _Building(ProgramJob):
         self._made = self._open_folder("brdfc-measured-", {"fits.json": listed})
         command = build_command(str(self._made), str(self._made / "fits.json"))
         try:
-            self._start(command)
+            self._start(command, environment=kept_groups.environment())
         except OSError as failed:
             raise self._failed(f"{command[0]}: {failed}") from failed
 

@@ -241,8 +241,7 @@ def add_sphere(scene, material, segments=32):
     bmesh.ops.create_uvsphere(build, u_segments=segments, v_segments=segments // 2, radius=1)
     build.to_mesh(mesh)
     build.free()
-    for polygon in mesh.polygons:
-        polygon.use_smooth = True
+    mesh.shade_smooth()
     mesh.materials.append(material)
     ball = bpy.data.objects.new("Sphere", mesh)
     scene.collection.objects.link(ball)

@@ -51,7 +51,7 @@ def room(scene, material):
     helpers.add_camera(scene, (0, -5.5, 2.2), (1.25, 0, 0))
     helpers.add_world(scene, 0.05)
     scene.render.resolution_x = scene.render.resolution_y = 32
-    scene.cycles.samples, scene.cycles.max_bounces = 400, 8
+    scene.cycles.samples, scene.cycles.max_bounces = 128, 8
     scene.cycles.sample_clamp_indirect = 0
     return floor
 

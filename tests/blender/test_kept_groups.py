@@ -9,11 +9,10 @@ import pytest
 
 
 @pytest.fixture
-def kept(extension, empty):
-    """The module, with an empty folder."""
+def kept(extension, empty, monkeypatch, tmp_path):
+    """The module, with an empty folder; what other tests keep stays."""
     module = import_module(f"{extension.package}.content.kept_groups")
-    for path in module._folder().iterdir():
-        path.unlink()
+    monkeypatch.setattr(bpy.utils, "extension_path_user", lambda *_, **__: str(tmp_path))
     return module
 
 
@@ -90,12 +89,12 @@ def test_what_was_made_once_is_appended(extension, kept, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("content", [b"", b"no file of Blender", None])
 def test_a_file_that_is_damaged_is_made_anew(extension, kept, content):
-    made = described(formulas(extension.api.new_material("ward", "nodes"), extension))
+    made = described(formulas(extension.api.new_material("glass", "nodes"), extension))
     (path,) = kept._folder().iterdir()
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) // 2] if content is None else content)
     new_file()
-    material = extension.api.new_material("ward", "nodes")
+    material = extension.api.new_material("glass", "nodes")
     assert described(formulas(material, extension)) == made
     assert [p.stat().st_size > 1000 for p in kept._folder().iterdir()] == [True]
 
@@ -103,7 +102,7 @@ def test_a_file_that_is_damaged_is_made_anew(extension, kept, content):
 def test_files_of_other_versions_go(extension, kept):
     older = kept._folder() / "4.5.0-0123456789ab-0123456789abcdef.blend"
     older.write_bytes(b"")
-    extension.api.new_material("ward", "nodes")
+    extension.api.new_material("glass", "nodes")
     (path,) = kept._folder().iterdir()
     assert path != older
 
@@ -113,7 +112,7 @@ def test_a_folder_that_can_not_be_made_matters_to_nobody(extension, kept, monkey
         raise ValueError("no such extension")
 
     monkeypatch.setattr(bpy.utils, "extension_path_user", fail)
-    assert formulas(extension.api.new_material("ward", "nodes"), extension).nodes
+    assert formulas(extension.api.new_material("glass", "nodes"), extension).nodes
 
 
 def test_nothing_of_the_scene_is_kept(extension, kept):

@@ -134,6 +134,17 @@ def test_catalogues_and_what_is_said_of_each_material(extension, library, made, 
             assert np.abs(shown - meant).max() < 0.01
 
 
+def test_the_second_blender_keeps_its_nodes_for_this_one(extension, made, empty):
+    """And finds those that this one kept: making them takes seconds for each model."""
+    kept = importlib.import_module(f"{extension.package}.content.kept_groups")
+    (folder,) = kept.environment().values()
+    formulas = [e for e in extension.api.models().values() if "nodes" in e["representations"]]
+    assert len(list(Path(folder).iterdir())) >= len(formulas)
+    files = sorted(Path(folder).iterdir())
+    extension.api.new_material("ward", "nodes")
+    assert sorted(Path(folder).iterdir()) == files, "it is appended"
+
+
 @pytest.mark.long
 def test_one_click_adds_it_and_one_takes_it_away(extension, library, made, empty):
     def buttons():

@@ -100,20 +100,23 @@ def one_before_the_other(scene):
 
 def blocks_of(extension, model, values, form, light, samples, pictures=6):
     """Means of blocks of pixels, one picture per row: (pictures, blocks)."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene = bpy.context.scene
+    settings(extension, scene, samples, osl=form != "nodes")
+    add_camera(scene, (0, -4, 0), (math.pi / 2, 0, 0), orthographic=2.2)
+    add_sphere(scene, extension.api.new_material(model, form, **values), segments=128)
+    light(scene)
+    bpy.context.view_layer.update()
+    extension.api.see_lamps(scene)
+    # Cycles keeps the compiled shader, which takes longer than a picture.
+    scene.render.use_persistent_data = True
     found = []
-    for seed in range(pictures):
-        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-        scene = bpy.context.scene
-        settings(extension, scene, samples, osl=form != "nodes")
-        scene.cycles.seed = seed
-        add_camera(scene, (0, -4, 0), (math.pi / 2, 0, 0), orthographic=2.2)
-        add_sphere(scene, extension.api.new_material(model, form, **values), segments=128)
-        light(scene)
-        bpy.context.view_layer.update()
-        extension.api.see_lamps(scene)
+    for scene.cycles.seed in range(pictures):
         picture = render(scene)[..., 1]
         side = len(picture) // BLOCK
         found.append(picture.reshape(side, BLOCK, side, BLOCK).mean((1, 3)).ravel())
+    # Nothing but a picture with other settings frees what Cycles keeps.
+    scene.render.use_persistent_data = False
     return np.array(found)
 
 
