@@ -273,10 +273,47 @@ class _Nearest:
         self.room = w.math("MINIMUM", self.room, beside)
 
 
+#: What _keep_apart() needs to know of a lamp besides the inputs of the part "aside".
+_BOUNDS = ("towards", "reach", "flat", "used", "active", "above", "plane", "clear", "count")
+#: What it decides: the first three, and of a lamp that is moved aside the others.
+_DECIDED = ("shown", "lit", "room", "count", "clear", "chord", "of_cones", "solid_angle", "axis 0")
+
+
 def _keep_apart(w, parts, lamps, at, widest):
-    """Decides which lamps get closures, where, and how wide each may be. If two cones overlap, the
-    lamp with the earlier slot, which is the wider one, gets a cone beside the other if it is flat
-    and the other is much smaller; otherwise it is left to random directions.
+    """Decides which lamps get closures, where, and how wide each may be, in a group that all models
+    share; sets _DECIDED of each lamp."""
+    kinds = {name: kind for name, kind in [*_SEEN, *_CODED, *_AXES, *_CONES]}
+    kinds |= dict.fromkeys(_SLOT, "VECTOR")
+    of_lamp = [*_BOUNDS, *parts.inputs("aside"), *_DECIDED[3:]]
+    taken = [name for name in dict.fromkeys(of_lamp) if name in kinds]
+
+    def sockets(names):
+        return [
+            [f"lamp {i} {name}", kinds.get(name, "FLOAT")]
+            for i in range(len(lamps))
+            for name in names
+        ]
+
+    def fill(inside, found):
+        of_lamps = [{name: found[f"lamp {i} {name}"] for name in taken} for i in range(len(lamps))]
+        _decide(inside, parts.on(inside, found), of_lamps, found["at"], widest)
+        return {
+            f"lamp {i} {name}": lamp[name] for i, lamp in enumerate(of_lamps) for name in _DECIDED
+        }
+
+    content = ["lamps apart", len(lamps), widest, taken, parts.data["aside"]]
+    inputs = [["at", "VECTOR"], *sockets(taken)]
+    group = make_group("lamps apart", content, inputs, sockets(_DECIDED), fill)
+    given = {f"lamp {i} {name}": lamp[name] for i, lamp in enumerate(lamps) for name in taken}
+    made = add_group(w, group, given | {"at": at}, "lamps apart")
+    for i, lamp in enumerate(lamps):
+        lamp |= {name: made[f"lamp {i} {name}"] for name in _DECIDED}
+
+
+def _decide(w, parts, lamps, at, widest):
+    """If two cones overlap, the lamp with the earlier slot, which is the wider one, gets a cone
+    beside the other if it is flat and the other is much smaller; otherwise it is left to random
+    directions.
 
     Goes from the last slot to the first, so that the empty slots, which are constant to Cycles,
     come first.
