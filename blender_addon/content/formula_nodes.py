@@ -256,20 +256,25 @@ def _same_plane(w, lamp, other):
     return w.math("MULTIPLY", same, w.math("GREATER_THAN", lamp["plane"], 0.5))
 
 
-class _Nearest:
-    """The later lamp that comes nearest to a lamp, in its direction and its radius; and how much
-    room these two, and the one that comes second, leave around the lamp's axis."""
+class _Later:
+    """The later lamps, as seen along a lamp's axis: direction, radius and room of the nearest ball
+    or sun, and the room that all others leave. Flat lamps are not told apart from each other, which
+    would need more numbers than SVM can keep for eight of them."""
 
     def __init__(self, w):
-        self.w, self.room, self.second = w, _FAR, _FAR
+        self.w, self.room, self.others = w, _FAR, _FAR
         self.towards, self.radius = (0.0, 0.0, 0.0), 0.0
 
-    def add(self, beside, towards, radius):
+    def add(self, beside, lamp):
         w = self.w
+        of_flat = w.mix(lamp["flat"], _FAR, beside)
+        beside = w.mix(lamp["flat"], beside, _FAR)
         closer = w.math("LESS_THAN", beside, self.room)
-        self.second = w.math("MINIMUM", self.second, w.math("MAXIMUM", beside, self.room))
-        self.towards = w.mix(closer, self.towards, towards, True)
-        self.radius = w.mix(closer, self.radius, radius)
+        second = w.math("MAXIMUM", beside, self.room)
+        for room in (of_flat, second):
+            self.others = w.math("MINIMUM", self.others, room)
+        self.towards = w.mix(closer, self.towards, lamp["towards"], True)
+        self.radius = w.mix(closer, self.radius, lamp["as_other"])
         self.room = w.math("MINIMUM", self.room, beside)
 
 
@@ -327,35 +332,38 @@ def _decide(w, parts, lamps, at, widest):
             distance = w.mix(_same_plane(w, lamp, other), distance, _FAR)
             apart[i, j] = apart[j, i] = w.mix(other["used"], _FAR, distance)
     for i, lamp in reversed(list(enumerate(lamps))):
-        nearest = _Nearest(w)
+        later = _Later(w)
         for j in range(len(lamps) - 1, i, -1):
             beside = w.math("SUBTRACT", apart[i, j], lamps[j]["taken"])
-            nearest.add(beside, lamps[j]["towards"], lamps[j]["as_other"])
-        free = w.math("LESS_THAN", lamp["reach"], nearest.room)
-        aside = _move_aside(w, parts, lamp, at, nearest)
+            later.add(beside, lamps[j])
+        room = w.math("MINIMUM", later.room, later.others)
+        free = w.math("LESS_THAN", lamp["reach"], room)
+        aside = _move_aside(w, parts, lamp, at, later)
         shown = w.math("MULTIPLY", lamp["active"], w.math("MAXIMUM", free, aside))
         lamp["shown"] = shown
         lamp["lit"] = w.math("MULTIPLY", shown, lamp["above"])
         # No cone can be beside a lamp that has no closure.
         lamp["as_other"] = w.mix(shown, _FAR, lamp["reach"])
-        room = w.math("MINIMUM", nearest.room, widest)
+        room = w.math("MINIMUM", room, widest)
         for j in range(i - 1, -1, -1):
             beside = w.math("SUBTRACT", apart[i, j], lamps[j]["taken"])
             room = w.math("MINIMUM", room, beside)
         lamp["room"] = room
 
 
-def _move_aside(w, parts, lamp, at, nearest):
-    """Gives a flat lamp a single cone beside the nearest later lamp, if they overlap; returns 1 if
+def _move_aside(w, parts, lamp, at, later):
+    """Gives a flat lamp a single cone beside the nearest ball or sun, if they overlap; returns 1 if
     it has that, otherwise 0."""
-    overlaps = w.math("LESS_THAN", nearest.room, lamp["reach"])
+    overlaps = w.math("LESS_THAN", later.room, lamp["reach"])
+    # Constant where no later slot has a ball or a sun, so that Cycles removes what follows.
+    has_later = w.math("LESS_THAN", later.room, _FAR - 0.1)
     # Part of a lamp that the horizon cuts may be hidden: that is left to random directions.
     whole = w.math("GREATER_THAN", lamp["clear"], w.math("SUBTRACT", lamp["count"], 0.01))
-    alone = w.math("LESS_THAN", lamp["reach"], nearest.second)
-    other = {"other": nearest.towards, "other_radius": nearest.radius}
+    alone = w.math("LESS_THAN", lamp["reach"], later.others)
+    other = {"other": later.towards, "other_radius": later.radius}
     made = parts.add("aside", at=at, **lamp, **other)
-    aside = w.math("MULTIPLY", lamp["flat"], overlaps)
-    for condition in (whole, alone, made["fits"]):
+    aside = w.math("MULTIPLY", lamp["flat"], has_later)
+    for condition in (overlaps, whole, alone, made["fits"]):
         aside = w.math("MULTIPLY", aside, condition)
     hit = w.math("GREATER_THAN", lamp["solid_angle"], 0.0)
     new = {"count": 1.0, "clear": 1.0, "chord": made["chord"], "of_cones": made["of_cones"]}
