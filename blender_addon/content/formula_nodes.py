@@ -216,8 +216,8 @@ def _lamp_group(parts):
     value at one of its points, or the part of it that random directions leave. Cycles skips its
     computations where the factor `lit` is 0."""
     vectors = (*_SLOT, "towards", "at", "view", "tangent", "bitangent", "normal", "anywhere")
-    of_cone = ("chord", "flat", "room", "solid_angle", "clear", "count")
-    numbers = (*of_cone, "of_cones", "most", "drop", "lit", "u_0", "u_1", "u_2")
+    of_cone = ("chord", "flat", "room", "solid_angle", "clear", "count", "of_cones")
+    numbers = (*of_cone, "most", "drop", "lit", "u_0", "u_1", "u_2")
     inputs = [[name, "VECTOR"] for name in vectors] + [[name, "FLOAT"] for name in numbers]
     inputs += [["kind", "FLOAT"], *_AXES, *_CONES]
     inputs += [[name, kind] for name, kind in parts.inputs("value").items() if name != "wi"]
@@ -278,10 +278,14 @@ class _Later:
         self.room = w.math("MINIMUM", self.room, beside)
 
 
+#: What changes where a lamp has a cone beside another lamp. Only so many lamps can have that, from
+#: the widest, since SVM keeps the numbers of all lamps at a time.
+_OF_CONE = ("count", "clear", "chord", "axis 0")
+_MOST_ASIDE = 4
 #: What _keep_apart() needs to know of a lamp besides the inputs of the part "aside".
-_BOUNDS = ("towards", "reach", "flat", "used", "active", "above", "plane", "clear", "count")
-#: What it decides: the first three, and of a lamp that is moved aside the others.
-_DECIDED = ("shown", "lit", "room", "count", "clear", "chord", "of_cones", "solid_angle", "axis 0")
+_BOUNDS = ("towards", "reach", "flat", "used", "active", "above", "plane", *_OF_CONE)
+#: What it decides.
+_DECIDED = ("shown", "lit", "room", *_OF_CONE)
 
 
 def _keep_apart(w, parts, lamps, at, widest):
@@ -289,7 +293,7 @@ def _keep_apart(w, parts, lamps, at, widest):
     share; sets _DECIDED of each lamp."""
     kinds = {name: kind for name, kind in [*_SEEN, *_CODED, *_AXES, *_CONES]}
     kinds |= dict.fromkeys(_SLOT, "VECTOR")
-    of_lamp = [*_BOUNDS, *parts.inputs("aside"), *_DECIDED[3:]]
+    of_lamp = [*_BOUNDS, *parts.inputs("aside")]
     taken = [name for name in dict.fromkeys(of_lamp) if name in kinds]
 
     def sockets(names):
@@ -338,8 +342,9 @@ def _decide(w, parts, lamps, at, widest):
             later.add(beside, lamps[j])
         room = w.math("MINIMUM", later.room, later.others)
         free = w.math("LESS_THAN", lamp["reach"], room)
-        aside = _move_aside(w, parts, lamp, at, later)
-        shown = w.math("MULTIPLY", lamp["active"], w.math("MAXIMUM", free, aside))
+        if i < _MOST_ASIDE:
+            free = w.math("MAXIMUM", free, _move_aside(w, parts, lamp, at, later))
+        shown = w.math("MULTIPLY", lamp["active"], free)
         lamp["shown"] = shown
         lamp["lit"] = w.math("MULTIPLY", shown, lamp["above"])
         # No cone can be beside a lamp that has no closure.
@@ -365,9 +370,7 @@ def _move_aside(w, parts, lamp, at, later):
     aside = w.math("MULTIPLY", lamp["flat"], has_later)
     for condition in (overlaps, whole, alone, made["fits"]):
         aside = w.math("MULTIPLY", aside, condition)
-    hit = w.math("GREATER_THAN", lamp["solid_angle"], 0.0)
-    new = {"count": 1.0, "clear": 1.0, "chord": made["chord"], "of_cones": made["of_cones"]}
-    new["solid_angle"] = w.math("MULTIPLY", made["of_cones"], hit)
+    new = {"count": 1.0, "clear": made["clear"], "chord": made["chord"]}
     lamp |= {name: w.mix(aside, lamp[name], value) for name, value in new.items()}
     lamp[_CONES[0][0]] = w.mix(aside, lamp[_CONES[0][0]], made["axis"], True)
     return aside

@@ -16,7 +16,7 @@
 // so that the model's formula runs once. Cycles drops closures with a small weight, so the cone of a small lamp is
 // widened until it carries kWidened of the light; that share of the light beside the lamp then counts twice. If the
 // cones of two lamps overlap, light in the overlap would count twice. If one of them is a rectangle or an ellipse and
-// the other is much smaller, as the sun behind a window is, the wide one has a cone beside the small one (cone_aside).
+// the other is a much smaller ball or sun, as behind a window, the wide one has a cone beside the small one (cone_aside).
 // Otherwise the earlier lamp in the list, which is sorted by size with the widest first, is left to drawn directions.
 //
 // The formulas run only as nodes (print/node_program.h), for which a division by 0 and the root of a negative number
@@ -204,7 +204,7 @@ template <class T> T emphasis_at(const LampSlot<T>& slot, const LampAxes<T>& lam
 template <class T> struct ConeAside {
   Vec3<T> towards;  ///< unit vector along its axis
   T chord;          ///< its radius
-  T of_cones;       ///< its solid angle, increased by the share of the flat lamp that the small one covers
+  T clear;          ///< LampCone::clear, more than 1 by the share of the flat lamp that the small one covers
   T fits;           ///< 1 if the other lamp is small enough, otherwise 0
 };
 /// The part of a small disk of directions about `other` that lies within a rectangle or an ellipse.
@@ -241,7 +241,7 @@ template <class T> ConeAside<T> cone_aside(const LampSlot<T>& slot, const LampAx
   const T distance2 = dot(centre, centre), facing = abs(dot(lamp.away, centre)) / sqrt(distance2);
   const T whole = emphasis_at(slot, lamp, facing, distance2, T(1));
   const T covered = part_within(slot, lamp, at, other, other_radius) * (sqr(other_radius) * T(kPi)) / whole;
-  out.of_cones = sqr(out.chord) * T(kPi) / (T(1) - covered);
+  out.clear = T(1) / (T(1) - covered);
   out.fits = select(other_radius < inner * T(kSmall), T(1), T(0));
   return out;
 }
@@ -325,8 +325,10 @@ template <class T> ToonLobe<T> toon_lobe(const LampCone<T>& cone, const T& empha
   const T factor = emphasis * whole * part_of_lamp(cone, emphasis, density);
   const T largest = max_component(value) * factor;
   const T wide = minimum(sqrt(T(kWidened / kPi) / largest), room);
-  const T chord = maximum(cone.chord, select(cone.flat > T(0.5), T(0), wide)), chord2 = chord * chord;
-  const T extent = chord2 * T(kPi);
+  const auto is_flat = cone.flat > T(0.5);
+  const T chord = maximum(cone.chord, select(is_flat, T(0), wide)), chord2 = chord * chord;
+  // A cone that was moved aside is smaller, and carries the same light.
+  const T extent = select(is_flat, cone.of_cones / cone.cones.count, chord2 * T(kPi));
   ToonLobe<T> out;
   // The angle 2 asin(chord / 2), with a relative error of 1e-4.
   out.size = chord * (T(2 / kPi) +

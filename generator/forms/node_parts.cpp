@@ -113,7 +113,7 @@ NodeProgram record_aside() {
                                              Expr::input("inner"), input3("other"), Expr::input("other_radius"));
     p.output("axis", aside.towards);
     p.output("chord", aside.chord);
-    p.output("of_cones", aside.of_cones);
+    p.output("clear", aside.clear);
     p.output("fits", aside.fits);
   });
 }
@@ -139,6 +139,7 @@ NodeProgram record_lobe() {
     LampCone<Expr> cone;
     cone.chord = Expr::input("chord");
     cone.flat = Expr::input("flat");
+    cone.of_cones = Expr::input("of_cones");
     cone.solid_angle = Expr::input("solid_angle");
     cone.clear = Expr::input("clear");
     cone.cones.count = Expr::input("count");
