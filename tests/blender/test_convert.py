@@ -945,6 +945,20 @@ def test_nodes_that_are_not_used_are_not_converted(extension, convert):
     assert convert.apply([plan]) == 0 and node.outputs[0].is_linked
 
 
+@pytest.mark.parametrize("mapped", [None, "Base Color", "Metallic", "Roughness", "Normal"])
+def test_an_object_that_glows_stays_a_lamp(extension, convert, empty, mapped):
+    """Whatever varies in the rest of its material."""
+    material, node = material_of("principled", Emission_Strength=5.0, Emission_Color=GOLD)
+    helpers.add_sphere(empty, material).scale = (0.3, 0.3, 0.3)
+    helpers.add_sphere(empty, extension.api.new_material("ward", "nodes")).location = (3, 0, 0)
+    if mapped:
+        kind = "ShaderNodeBump" if mapped == "Normal" else "ShaderNodeTexNoise"
+        linked(material, node, mapped, kind)
+    assert [lamp.slot for lamp in extension.api.see_lamps(empty)] == [1]
+    assert convert.apply(convert.plan([material])) == 1
+    assert [(lamp.slot, lamp.why) for lamp in extension.api.see_lamps(empty)] == [(1, "")]
+
+
 # ---- as importers leave them ---------------------------------------------------------------------
 
 
