@@ -126,14 +126,15 @@ class Plan(Part):
         of = {"model": self._label(), "percent": self._percent()}
         if self.error > _LARGE and (socket := self.cause()):
             why = say(
-                "its nearest model, {model}, sends {percent} % of the light in other directions, "
-                "because of the node's {socket}",
+                "its nearest model, {model}, sends {percent} % of the light in other directions "
+                "than the node, because of its {socket}",
                 **of,
                 socket=Sentence(socket),
             )
         else:
             why = say(
-                "its nearest model, {model}, sends {percent} % of the light in other directions",
+                "its nearest model, {model}, sends {percent} % of the light in other directions "
+                "than the node",
                 **of,
             )
         return replace(self, refusal=why)
@@ -206,7 +207,8 @@ class Plan(Part):
             said = say("{material}, {node}: {model}, the same", **of)
         else:
             said = say(
-                "{material}, {node}: {model}, {percent} % of the light in other directions",
+                "{material}, {node}: {model}, {percent} % of the light in other directions than "
+                "the node's",
                 **of,
                 percent=self._percent(),
             )
@@ -375,8 +377,8 @@ def _lacking(natives, colors):
     """Why no model is near: a sentence."""
     if fit := nearest(natives, colors, False, _shown(False)):
         return say(
-            "its nearest model, {model}, which sends {percent} % of the light in other directions, "
-            "needs Open Shading Language for its values",
+            "its nearest model, {model}, which sends {percent} % of the light in other directions "
+            "than the node, needs Open Shading Language for its values",
             model=pack.model(fit.candidate.model)["label"],
             percent=in_percent(max(error for _, error in fit.found)),
         )

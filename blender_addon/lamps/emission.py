@@ -79,14 +79,28 @@ def _is_other_side(output):
     return output.node.bl_idname == "ShaderNodeNewGeometry" and output.name == "Backfacing"
 
 
+def _is_lit(shown, known):
+    """Whether a node emits, or one whose shader reaches it. `known`: the answers so far."""
+    if shown not in known:
+        known[shown] = False  # the answer while it is being examined
+        names = _EMITTERS.get(shown.node.bl_idname)
+        reached = [shown.reach(s) for s in shown.node.inputs if s.type == "SHADER"]
+        known[shown] = bool(names and _strength(shown, names) != 0) or any(
+            _is_lit(r.shown, known) for r in reached if r.output is not None
+        )
+    return known[shown]
+
+
 def is_even(owner):
-    """Whether a light or a material emits uniformly."""
+    """Whether a light or a material emits uniformly. Mixes of shaders that do not emit, such as
+    those of a layer and its base, don't matter."""
+    known = {}
     for shown in shader_trees.shown(owner):
         node = shown.node
+        if not _is_lit(shown, known):
+            continue
         names = _JOINTS.get(node.bl_idname, ())
         if node.bl_idname in _EMITTERS:
-            if _strength(shown, _EMITTERS[node.bl_idname]) == 0:
-                continue
             names = (*_EMITTERS[node.bl_idname], *(("Alpha",) if "Alpha" in node.inputs else ()))
         if any(_differs(node.inputs[name], shown.within, set()) for name in names):
             return False

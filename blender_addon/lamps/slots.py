@@ -59,8 +59,9 @@ def elsewhere(library):
 @dataclass(frozen=True)
 class Lamp:
     """A lamp of a scene: its slot from 1, or None and the reason; its estimated irradiance at the
-    subject, by which lamps are ranked; whether it has no size; and whether random rays hit it, so
-    that it is visible even without a slot."""
+    subject, by which lamps are ranked; whether it has no size; whether random rays hit it, so that
+    it is visible even without a slot; and whether its transform makes another shape of it than
+    Cycles' light sampling assumes."""
 
     name: str
     slot: int | None
@@ -68,6 +69,7 @@ class Lamp:
     why: str = ""
     sizeless: bool = False
     met: bool = True
+    distorted: bool = False
 
 
 @dataclass(frozen=True)
@@ -128,6 +130,7 @@ class Candidate:
     sizeless: bool = False
     met: bool = True  # random rays hit it
     uneven: bool = False  # its emission is not uniform
+    distorted: bool = False  # see Lamp
     sheet: Sheet | None = None  # of a flat lamp
     #: If they depend on the subject, judge(points) sets the values and `why`, given its points,
     #: (n, 3).

@@ -142,7 +142,10 @@ def sheared_lamps(at):
     drawn = "zero_size_lights" in at.cycles_form.get("warnings", []) if at.cycles_form else False
     if not drawn and not (at.aims and nodes.runs_anywhere(at.node)):
         return []
-    return _any([x for x in at.lamps if lamps.kind_of(x.data).is_distorted(x.matrix_world)])
+    found = [x for x in at.lamps if lamps.kind_of(x.data).is_distorted(x.matrix_world)]
+    objects = {x.name for x in at.lamps}
+    # Of instances, only a survey knows.
+    return _any(found + [x for x in at.found_lamps if x.distorted and x.name not in objects])
 
 
 def small_lamps(at):

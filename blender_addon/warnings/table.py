@@ -202,8 +202,8 @@ OF_NODE = (
     Row(
         "sheared_lamps",
         WARNING,
-        "Area lamps ({lamps}) are sheared by a parent that is scaled unevenly: highlights are up "
-        "to a third too dark or too bright; apply the parent's scale",
+        "Area lamps ({lamps}) are sheared by a parent or an instance that is scaled unevenly: "
+        "their light is up to half too dark or too bright; apply that scale or make it even",
         lamp_rules.sheared_lamps,
     ),
 )

@@ -45,7 +45,7 @@ void add_compare_command(Command app) {
       "is judged, and --test tells error from noise.");
   command.add_option("A... B", options->files, "One or more EXR files to judge, then the reference EXR")
       .required()
-      .expected(2, 1 << 16);
+      .expected(1, 1 << 16);
   command.add_flag("--json", options->json, "Print JSON instead of a table");
   command.add_option("--diff", options->diff,
                      "Write the difference as PNG: red where A is brighter, blue where darker");
@@ -64,6 +64,8 @@ void add_compare_command(Command app) {
              "First brighten A by this fraction, to see whether the test detects it")
       .needs(test);
   command.callback([options] {
+    if (options->files.size() < 2)
+      input_error("compare: expected one or more pictures and then the reference, got {} alone", options->files[0]);
     const std::string name_a = options->files.front(), name_b = options->files.back();
     std::vector<reference::Rendering> pictures;
     for (std::size_t i = 0; i + 1 < options->files.size(); ++i) {

@@ -76,16 +76,22 @@ void print_text(const Model& m) {
 }  // namespace
 
 void add_list_command(Command app) {
-  auto json = std::make_shared<bool>(false);
+  struct Options {
+    std::string model;
+    bool json = false;
+  };
+  auto options = std::make_shared<Options>();
   const Command cmd = app.add_subcommand("list", "The models, their parameters and forms.");
-  cmd.add_flag("--json", *json, "Print JSON: an array of objects");
-  cmd.callback([json] {
-    if (*json) {
+  cmd.add_option("model", options->model, "The name of a model. All models if omitted");
+  cmd.add_flag("--json", options->json, "Print JSON: an array of objects");
+  cmd.callback([options] {
+    const std::vector<const Model*> listed = models_named(options->model);
+    if (options->json) {
       Json all = Json::array();
-      for (const auto& [name, model] : models()) all.push_back(describe(*model));
+      for (const Model* model : listed) all.push_back(describe(*model));
       fmt::print("{}\n", json_text(all, 2));
     } else {
-      for (const auto& [name, model] : models()) print_text(*model);
+      for (const Model* model : listed) print_text(*model);
     }
   });
 }

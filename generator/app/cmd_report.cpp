@@ -16,6 +16,8 @@ void add_report_command(Command app) {
   const auto folder = std::make_shared<std::string>();
   command.add_option("DIR", *folder, "A folder with one folder per scene, each with a runs.json").required();
   command.callback([folder] {
+    for (const auto& scene : report::not_rendered(*folder))
+      fmt::print(stderr, "brdfc: {}: left out, it was not rendered: it has no runs.json\n", scene.string());
     const std::vector<report::SceneReport> scenes = report::write_report(*folder);
     fmt::print(stdout, "{}", report::report_csv(scenes));
     fmt::print(stderr, "wrote {}/index.html, report.json and report.csv\n", *folder);

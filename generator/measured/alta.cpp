@@ -345,6 +345,7 @@ Measurement read_alta(const std::filesystem::path& path) {
   Measurement out;
   out.file = name;
   out.format = "ALTA";
+  out.pairs = rows.given().size();
   if (const auto sample = header.values.find("SAMPLE"); sample != header.values.end())
     for (const char c : sample->second) out.description += c >= ' ' && c < 127 ? c : ' ';
   if (channels == 1) out.notes.emplace_back("one number a row: the data are grey");

@@ -113,6 +113,7 @@ Measurement read_csv_grid(const std::filesystem::path& path) {
   read_grid_of_directions(rows, out);
   out.file = name;
   out.format = "CSV";
+  out.pairs = rows.given().size();
   return out;
 }
 

@@ -427,6 +427,7 @@ const Model* strongest_highlight(const LobeSum& sum, const std::vector<LobeKind>
 
 std::vector<LobeSum> fit_lobes(const Measurement& m, const MeasuredModel& data, const std::vector<LobeKind>& kinds,
                                std::size_t most, const std::function<void(std::size_t)>& progress) {
+  require_enough_to_fit(m);
   const auto start = std::chrono::steady_clock::now();
   const Fitter fitter(m, data, kinds);
   std::vector<LobeSum> out;

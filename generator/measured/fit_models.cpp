@@ -304,6 +304,8 @@ std::optional<std::string> order_of_fits(const std::vector<ModelFit>& fits) {
 std::vector<ModelFit> fit_models(const Measurement& m, const MeasuredModel& data,
                                  const std::vector<const Model*>& models, Matte matte,
                                  const std::function<void(const Model&, std::size_t done)>& progress) {
+  if (models.empty()) return {};
+  require_enough_to_fit(m);
   const Pairs coarse = make_pairs(data, kCoarse, 1), fine = make_pairs(data, kFine, 2),
               last = make_pairs(data, kFinal, 3);
   std::vector<std::optional<ModelFit>> found(models.size());

@@ -35,6 +35,12 @@ Measurement read_measurement(const std::filesystem::path& path, const ToRgb& to_
   return m;
 }
 
+void require_enough_to_fit(const Measurement& m) {
+  if (m.pairs && *m.pairs < kFewestPairs)
+    input_error("{}: expected at least {} pairs of directions to fit something to, found {}", m.file, kFewestPairs,
+                *m.pairs);
+}
+
 double largest(const std::vector<std::array<float, 3>>& values) {
   double out = 0;
   for (const auto& value : values)

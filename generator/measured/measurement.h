@@ -13,6 +13,7 @@
 #include <array>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -43,12 +44,14 @@ class Table {
 
 struct Measurement {
   std::string file;
-  std::string format;              ///< "MERL", "RGL", "UTIA", "ALTA" or "CSV"
-  std::string description;         ///< text that the file has about itself, if any
-  std::string grid;                ///< resolution, for people
-  bool isotropic = true;           ///< unchanged when both directions are rotated about the normal
-  double highest = 90;             ///< largest angle to the normal that was measured, in degrees
-  double largest = 0;              ///< of the numbers that it was made of
+  std::string format;       ///< "MERL", "RGL", "UTIA", "ALTA" or "CSV"
+  std::string description;  ///< text that the file has about itself, if any
+  std::string grid;         ///< resolution, for people
+  bool isotropic = true;    ///< unchanged when both directions are rotated about the normal
+  double highest = 90;      ///< largest angle to the normal that was measured, in degrees
+  double largest = 0;       ///< of the numbers that it was made of
+  /// Pairs of directions in a table of rows; nullopt for formats of fixed resolution, which have many.
+  std::optional<std::size_t> pairs = std::nullopt;
   std::vector<std::string> notes;  ///< a sentence for each thing that was assumed, left out or repaired
   std::shared_ptr<const Table> table;
 };
@@ -56,6 +59,10 @@ struct Measurement {
 /// Reads a file, whose name's extension says the format. Spectra are converted to X, Y and Z under D65, and by `to_rgb`
 /// to linear Rec.709. Throws InputError that names the file, the field or line, and what was expected.
 Measurement read_measurement(const std::filesystem::path&, const ToRgb& to_rgb);
+/// Fewest pairs of directions to which something can be fitted: models have up to about a dozen parameters.
+inline constexpr std::size_t kFewestPairs = 16;
+/// Throws InputError if a measurement has fewer.
+void require_enough_to_fit(const Measurement&);
 /// The extensions that read_measurement() knows.
 inline constexpr std::array<const char*, 6> kExtensions{".binary", ".bsdf", ".bin", ".alta", ".dat", ".csv"};
 

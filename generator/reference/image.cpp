@@ -284,6 +284,9 @@ void write_beside(const fs::path& path, const std::function<void(const fs::path&
 
 Rendering read_rendering(const fs::path& path) {
   const File file = read_file(path);
+  if (!file.header.floating)
+    input_error("{}: expected an image of floating-point numbers, such as .exr: these are encoded for a display",
+                path.string());
   const Channels color = find_channels(file.header);
   if (color.r < 0)
     input_error("{}: expected channels R, G, B, found {}", path.string(), fmt::join(file.header.channels, ", "));

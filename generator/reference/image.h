@@ -49,7 +49,7 @@ void write_beside(const std::filesystem::path& path, const std::function<void(co
 /// Reads a rendering: the channels R, G, B, without a layer or of the first layer that has them, such as Blender's
 /// "Combined"; the channels "variance.R/G/B" if present; and the working space, if the attribute colorInteropID or,
 /// without it, the attribute chromaticities gives it. Throws InputError that names the file, also if the attribute
-/// gives a space that is not among working_spaces().
+/// gives a space that is not among working_spaces(), or if the file has integers, which are encoded for a display.
 Rendering read_rendering(const std::filesystem::path& path);
 /// Writes a float EXR with the variance as layer "variance". The metadata and, if set, the working space are
 /// attributes.

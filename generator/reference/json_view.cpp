@@ -6,6 +6,8 @@
 #include <set>
 #include <sstream>
 
+#include "core/nearest.h"
+
 namespace brdfc::reference {
 
 namespace {
@@ -66,11 +68,12 @@ void JsonView::error(const std::string& message) const {
   throw InputError(file_ + ": " + (key_.empty() ? "" : shown(key_) + ": ") + message);
 }
 
-void JsonView::fail(const std::string& expected) const {
-  std::string found = value_->dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  if (found.size() > 60) found = found.substr(0, 57) + "...";
-  error("expected " + expected + ", found " + found);
+std::string JsonView::found() const {
+  const std::string found = value_->dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return found.size() > 60 ? found.substr(0, 57) + "..." : found;
 }
+
+void JsonView::fail(const std::string& expected) const { error("expected " + expected + ", found " + found()); }
 
 JsonView JsonView::child(const nlohmann::json& value, const std::string& key) const {
   return JsonView(value, file_, key_.empty() ? key : key_ + "." + key);
@@ -139,7 +142,8 @@ std::string JsonView::choice(const std::vector<std::string>& choices) const {
   const auto expected = [&] { return fmt::format("one of {}", fmt::join(choices, ", ")); };
   if (!value_->is_string()) fail(expected());
   const std::string s = value_->get<std::string>();
-  if (std::find(choices.begin(), choices.end(), s) == choices.end()) fail(expected());
+  if (std::find(choices.begin(), choices.end(), s) == choices.end())
+    error(fmt::format("{}expected {}, found {}", did_you_mean(s, choices), expected(), found()));
   return s;
 }
 

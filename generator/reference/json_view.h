@@ -29,6 +29,8 @@ class JsonView {
   const nlohmann::json& json() const { return *value_; }
   const std::string& key() const { return key_; }
 
+  /// The value for a message, shortened.
+  std::string found() const;
   /// Throws InputError "<file>: <key>: expected <expected>, found <value>".
   [[noreturn]] void fail(const std::string& expected) const;
   /// Throws InputError "<file>: <key>: <message>".

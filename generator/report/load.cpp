@@ -284,12 +284,20 @@ std::map<std::string, std::string> load_links(const fs::path& folder) {
   return links;
 }
 
+std::vector<fs::path> not_rendered(const fs::path& folder) {
+  std::vector<fs::path> out;
+  if (!fs::is_directory(folder)) return out;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (fs::exists(entry.path() / "scene.json") && !fs::exists(entry.path() / "runs.json")) out.push_back(entry.path());
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
 std::vector<SceneReport> load_report(const fs::path& folder) {
   if (!fs::is_directory(folder)) input_error("{}: not a folder", folder.string());
   std::vector<fs::path> folders;
   for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.is_directory() && (fs::exists(entry.path() / "runs.json") || fs::exists(entry.path() / "scene.json")))
-      folders.push_back(entry.path());
+    if (fs::exists(entry.path() / "runs.json")) folders.push_back(entry.path());
   if (folders.empty()) input_error("{}: no folder in it holds a runs.json", folder.string());
   std::sort(folders.begin(), folders.end());
   std::vector<SceneReport> scenes;

@@ -117,8 +117,10 @@ struct SceneReport {
   std::vector<std::string> commands;
 };
 
-/// Reads every scene under `folder`, in alphabetical order. Throws InputError that names the file and the key if
-/// something is missing or malformed, or if an image is not finite.
+/// The folders under `folder` whose scene was not rendered: they have a scene.json and no runs.json.
+std::vector<std::filesystem::path> not_rendered(const std::filesystem::path& folder);
+/// Reads every scene under `folder` that was rendered, in alphabetical order. Throws InputError that names the file and
+/// the key if something is missing or malformed, or if an image is not finite.
 std::vector<SceneReport> load_report(const std::filesystem::path& folder);
 
 /// Results of the closure conformance tests for one closure.

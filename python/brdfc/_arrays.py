@@ -279,7 +279,8 @@ class ArrayModel:
                 model._check_color(name, tuple(value.shape))
             values[name] = value
         shapes = {name: tuple(value.shape) for name, value in values.items()}
-        shape = model._broadcast([tuple(v.shape) for v in directions], shapes)
+        given_shapes = [tuple(v.shape) for v in directions]
+        shape = model._broadcast(dict(zip(vectors, given_shapes, strict=True)), shapes)
         np.rank = len(shape)
         whole = {"r": shape, "c": (3, *shape)}
         if formula is None:

@@ -130,7 +130,7 @@ class Model:
         wi, wo: unit vectors (..., 3) to the light and to the viewer; z is the normal.
         Returns (..., 3), linear RGB; 0 where a direction lies below the surface.
         """
-        vectors = [self._directions("wi", wi), self._directions("wo", wo)]
+        vectors = {"wi": self._directions("wi", wi), "wo": self._directions("wo", wo)}
         (f,) = self._run("eval", vectors, parameters, "c")
         return f
 
@@ -139,7 +139,7 @@ class Model:
 
         wi, wo: unit vectors (..., 3). Returns (...).
         """
-        vectors = [self._directions("wi", wi), self._directions("wo", wo)]
+        vectors = {"wi": self._directions("wi", wi), "wo": self._directions("wo", wo)}
         (p,) = self._run("pdf", vectors, parameters, "r")
         return p
 
@@ -153,18 +153,18 @@ class Model:
         numbers = self._vectors("u", u)
         if not np.all((numbers >= 0) & (numbers < 1)):
             raise ValueError(f"{self.name}: u: expected numbers in [0, 1)")
-        vectors = [self._directions("wo", wo), numbers]
+        vectors = {"wo": self._directions("wo", wo), "u": numbers}
         x, y, z, weight, pdf = self._run("sample", vectors, parameters, "rrrcr")
         return Sample(np.stack([x, y, z], axis=-1), weight, pdf)
 
     def mirror(self, wo: ArrayLike, **parameters: ArrayLike) -> Array:
         """The weight of ideal reflection; wo: (..., 3), returns (..., 3)."""
-        (weight,) = self._run("mirror", [self._directions("wo", wo)], parameters, "c")
+        (weight,) = self._run("mirror", {"wo": self._directions("wo", wo)}, parameters, "c")
         return weight
 
     def transmit(self, wo: ArrayLike, **parameters: ArrayLike) -> Array:
         """The weight of ideal refraction; wo: (..., 3), returns (..., 3)."""
-        (weight,) = self._run("transmit", [self._directions("wo", wo)], parameters, "c")
+        (weight,) = self._run("transmit", {"wo": self._directions("wo", wo)}, parameters, "c")
         return weight
 
     def albedo(
@@ -293,34 +293,43 @@ class Model:
             )
 
     def _broadcast(
-        self, vectors: list[tuple[int, ...]], values: Mapping[str, tuple[int, ...]]
+        self, vectors: Mapping[str, tuple[int, ...]], values: Mapping[str, tuple[int, ...]]
     ) -> tuple[int, ...]:
         """The shape that directions (..., 3), numbers (...) and colours (..., 3) of these shapes
         broadcast to, without the 3."""
-        leads = [shape[:-1] for shape in vectors]
+        leads = [shape[:-1] for shape in vectors.values()]
         for name, shape in values.items():
             leads.append(shape[:-1] if isinstance(self.parameters[name], Color) else shape)
         try:
             return np.broadcast_shapes(*leads)
         except ValueError:
-            names = ["wi or wo"] * len(vectors) + list(values)
-            described = ", ".join(f"{n} {s}" for n, s in zip(names, leads, strict=True))
+            shapes = {**vectors, **values}
+            given = zip(shapes.items(), leads, strict=True)
+            # One number or colour broadcasts to anything.
+            described = ", ".join(f"{n} {s}" for (n, s), lead in given if lead or n in vectors)
             raise ValueError(f"{self.name}: shapes do not broadcast: {described}") from None
 
     def _run(
-        self, what: str, vectors: list[Array], given: Mapping[str, ArrayLike], kinds: str
+        self,
+        what: str,
+        vectors: Mapping[str, Array],
+        given: Mapping[str, ArrayLike],
+        kinds: str,
     ) -> list[Array]:
         """The outputs of a formula, whose kinds are letters: r, a real, or c, a colour."""
         choices, values = self._bind(given)
         formula = getattr(self.formulas[choices], what)
         shape = self._broadcast(
-            [v.shape for v in vectors], {name: value.shape for name, value in values.items()}
+            {name: v.shape for name, v in vectors.items()},
+            {name: value.shape for name, value in values.items()},
         )
         size = int(np.prod(shape))
         out = [np.zeros((3, size) if k == "c" else size) for k in kinds]
         if formula is not None:
             arguments = [
-                np.broadcast_to(v[..., i], shape).reshape(size) for v in vectors for i in range(3)
+                np.broadcast_to(v[..., i], shape).reshape(size)
+                for v in vectors.values()
+                for i in range(3)
             ]
             for name, value in values.items():
                 colour = isinstance(self.parameters[name], Color)
@@ -348,7 +357,7 @@ class Model:
                         array[..., block] = result
         if what == "sample" and (formula is None or not self.two_sided):
             # Below the surface formulas may have no direction.
-            below = np.broadcast_to(vectors[0][..., 2] <= 0, shape).reshape(size)
+            below = np.broadcast_to(vectors["wo"][..., 2] <= 0, shape).reshape(size)
             lost = slice(None) if formula is None else below
             for array, value in zip(out, LOST, strict=True):
                 array[..., lost] = value

@@ -621,7 +621,7 @@ def test_a_limit_is_a_reason(extension, convert):
     (plan,) = extension.api.plan_conversion([material], limit=0.004)
     assert plan.line() == (
         f"{material.name}, Diffuse BSDF: stays, its nearest model, EON Rough Diffuse, sends "
-        f"{100 * plan.error:.2g} % of the light in other directions"
+        f"{100 * plan.error:.2g} % of the light in other directions than the node"
     )
     assert extension.api.convert_materials([plan]) == 0 and node.outputs[0].is_linked
     with pytest.raises(ValueError, match="Expected a number, got 'much'"):
@@ -643,7 +643,7 @@ def test_the_input_that_makes_an_error_large_is_said(extension, convert, kind, i
     plan = only(extension.api.plan_conversion([material_of(kind, **inputs)[0]], limit=0.02))
     assert plan.refusal.startswith("its nearest model, ")
     assert plan.refusal.endswith(
-        f" % of the light in other directions, because of the node's {cause}"
+        f" % of the light in other directions than the node, because of its {cause}"
     )
 
 
@@ -945,6 +945,20 @@ def test_nodes_that_are_not_used_are_not_converted(extension, convert):
     assert convert.apply([plan]) == 0 and node.outputs[0].is_linked
 
 
+@pytest.mark.parametrize("mapped", [None, "Base Color", "Metallic", "Roughness", "Normal"])
+def test_an_object_that_glows_stays_a_lamp(extension, convert, empty, mapped):
+    """Whatever varies in the rest of its material."""
+    material, node = material_of("principled", Emission_Strength=5.0, Emission_Color=GOLD)
+    helpers.add_sphere(empty, material).scale = (0.3, 0.3, 0.3)
+    helpers.add_sphere(empty, extension.api.new_material("ward", "nodes")).location = (3, 0, 0)
+    if mapped:
+        kind = "ShaderNodeBump" if mapped == "Normal" else "ShaderNodeTexNoise"
+        linked(material, node, mapped, kind)
+    assert [lamp.slot for lamp in extension.api.see_lamps(empty)] == [1]
+    assert convert.apply(convert.plan([material])) == 1
+    assert [(lamp.slot, lamp.why) for lamp in extension.api.see_lamps(empty)] == [(1, "")]
+
+
 # ---- as importers leave them ---------------------------------------------------------------------
 
 
@@ -1133,7 +1147,7 @@ def test_the_error_of_a_linked_colour_is_a_range(convert):
         same = only(convert.plan([material_of("principled", Base_Color=color, Roughness=0.5)[0]]))
         print(f"{color}: {same.error:.3g}, said {plan.line()}")
         assert plan.least_error * 0.9 < same.error < plan.error * 1.1
-    assert "in other directions" in plan.within(plan.error - 1e-6).refusal
+    assert "in other directions than the node" in plan.within(plan.error - 1e-6).refusal
 
 
 def test_the_error_of_an_image_is_that_of_its_mean(convert):

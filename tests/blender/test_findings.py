@@ -377,6 +377,30 @@ def test_sheared_area_lamps(extension, empty):
     assert "sheared_lamps" not in found(extension, aimed, empty)
 
 
+def test_sheared_instances_of_area_lamps(extension, empty):
+    material = extension.api.new_material("ward", "nodes")
+    helpers.add_sphere(empty, material)
+    collection = bpy.data.collections.new("Lamps")
+    lamp = helpers.add_lamp(empty, "AREA", "Lamp", (0, -2, 3), (0.5, 0.3, 0))
+    empty.collection.objects.unlink(lamp)
+    collection.objects.link(lamp)
+    copy = bpy.data.objects.new("Copy", None)
+    copy.instance_type, copy.instance_collection = "COLLECTION", collection
+    empty.collection.objects.link(copy)
+    for scale, expected in (((1, 1, 1), False), ((1, 1.1, 1), True), ((2, 2, 2), False)):
+        copy.scale = scale
+        messages = found(extension, material, empty)
+        assert ("sheared_lamps" in messages) == expected
+        assert not expected or "Copy/Lamp" in messages["sheared_lamps"]
+    copy.scale = (1, 1.1, 1)
+    sampled = extension.api.new_material("ward", "sampled")
+    aimed = extension.api.new_material("ward", "aimed")
+    assert "sheared_lamps" in found(extension, sampled, empty)
+    assert "sheared_lamps" not in found(extension, aimed, empty)
+    lamp.data.type = "POINT"
+    assert "sheared_lamps" not in found(extension, material, empty)
+
+
 @pytest.mark.parametrize("rays", ["visible_diffuse", "visible_glossy"])
 def test_ray_visibility_of_lamps(extension, empty, rays):
     material = ball(extension, empty)

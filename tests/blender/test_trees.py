@@ -560,6 +560,37 @@ def test_light_that_later_nodes_make_is_not_taken_to_be_even(extension, empty):
         assert not emission.is_even(material), kind
 
 
+def test_mixes_beside_a_light_do_not_make_it_uneven(extension, empty):
+    """As the layer and the base of a converted Principled node, which glows."""
+    emission = import_module(f"{extension.package}.lamps.emission")
+    material = helpers.node_material("ShaderNodeEmission", Strength=5.0)
+    tree = material.node_tree
+    mix, add = new(tree, "MixShader"), new(tree, "AddShader")
+    tree.links.new(new(tree, "LayerWeight").outputs["Facing"], mix.inputs[0])
+    tree.links.new(new(tree, "BsdfDiffuse").outputs[0], mix.inputs[1])
+    tree.links.new(mix.outputs[0], add.inputs[0])
+    tree.links.new(tree.nodes["Emission"].outputs[0], add.inputs[1])
+    surface = tree.get_output_node("CYCLES").inputs["Surface"]
+    tree.links.new(add.outputs[0], surface)
+    assert emission.is_even(material)
+    dark = new(tree, "Emission", Strength=0.0)
+    tree.links.new(dark.outputs[0], mix.inputs[2])
+    assert emission.is_even(material)
+    dark.inputs["Strength"].default_value = 1.0
+    assert not emission.is_even(material)
+    # In a group around it, and above the light.
+    group = bpy.data.node_groups.new("Group", "ShaderNodeTree")
+    group.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
+    inner, end = new(group, "Emission", Strength=5.0), new(group, "NodeGroupOutput")
+    group.links.new(inner.outputs[0], end.inputs[0])
+    user = new(tree, "Group")
+    user.node_tree = group
+    tree.links.new(user.outputs[0], mix.inputs[2])
+    assert not emission.is_even(material)
+    group.nodes.remove(inner)
+    assert emission.is_even(material)
+
+
 def test_a_muted_sky_has_no_sun(extension, empty):
     world = import_module(f"{extension.package}.lamps.world")
     tree, background = helpers.add_world(empty)

@@ -156,6 +156,14 @@ def test_a_damaged_picture_of_bytes(tmp_path):
     refused(run("compare", bad, bad), "bad.png: damaged PNG file: its header can't be read")
 
 
+def test_a_picture_that_is_encoded_for_a_display(tmp_path, picture):
+    """Its numbers are no radiance, so an error against a reference would mean nothing."""
+    shown = tmp_path / "shown.png"
+    assert run("compare", picture, picture, "--diff", shown).returncode == 0
+    for files in ((shown, picture), (picture, shown), (picture, shown, picture)):
+        refused(run("compare", *files), "shown.png: expected an image of floating-point numbers")
+
+
 def test_a_picture_of_no_known_kind(tmp_path):
     bad = tmp_path / "bad.mp4"
     bad.write_bytes(b"not read")

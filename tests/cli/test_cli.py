@@ -84,6 +84,11 @@ def test_the_extension_holds_fits_along_a_number_and_auto_does_not_take_them(tmp
     assert "float e = 10.0" in shader and "cxy" not in shader
 
 
+def test_list_of_one_model():
+    assert re.findall(r"(?m)^\w+", run("list", "ward").stdout) == ["ward"]
+    assert [m["name"] for m in json.loads(run("list", "ward", "--json").stdout)] == ["ward"]
+
+
 def test_list_json_is_the_schema():
     models = {m["name"]: m for m in json.loads(run("list", "--json").stdout)}
     assert set(MODELS) <= set(models)

@@ -58,7 +58,9 @@ def test_help_goes_to_stdout():
         (["build", "--out", "x"], "--all"),
         (["render", "absent.json", "--out", "a.exr"], "absent.json"),
         (["compare", "absent-a.exr", "absent-b.exr"], "absent-a.exr"),
+        (["compare", "alone.exr"], "got alone.exr alone"),
         (["report", "absent"], "absent"),
+        (["list", "warrd"], "did you mean ward? "),
     ],
 )
 def test_wrong_use_exits_2_with_one_line(arguments, says, tmp_path):
@@ -76,6 +78,7 @@ def test_wrong_use_exits_2_with_one_line(arguments, says, tmp_path):
         ("{ not json", "JSON"),
         (scene(camera=None), "camera"),
         (scene(materials={"m": {"model": "unknown"}}), "unknown"),
+        (scene(materials={"m": {"model": "warrd"}}), "model: did you mean ward? "),
         (scene(materials={"m": {"model": "lambert", "parameters": {"gloss": 1}}}), "gloss"),
         (scene(materials={"m": {"model": "lambert", "parameters": {"rho": 2}}}), "rho"),
         (

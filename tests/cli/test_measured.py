@@ -264,6 +264,25 @@ def angle_table(*columns):
     return "theta_i,phi_i,theta_o,phi_o,r,g,b\n" + rows + "\n"
 
 
+@pytest.mark.parametrize("options", [[], ["--lobes", "2"], ["--models", "ward"]])
+def test_nothing_is_fitted_to_a_few_rows(tmp_path, options):
+    file = tmp_path / "m.csv"
+    angles = [0, 10, 20, 30, 40, 50, 60, 70, 80]
+    for lights, views, enough in (
+        ([0], [0], False),
+        (angles[:3], angles[:5], False),
+        ([0, 45], angles, True),
+    ):
+        axes = grid(lights, [0], views, [0])
+        one = np.ones(len(axes[0]))
+        file.write_text(angle_table(*axes, one, one, one), encoding="utf-8")
+        done = run("measured", file, *options)
+        assert done.returncode == (0 if enough else 2), done.stderr
+        said = f"at least 16 pairs of directions to fit something to, found {len(one)}"
+        assert enough or said in done.stderr
+        assert run("measured", file, "--models", "none").returncode == 0
+
+
 def test_a_table_is_what_it_was_made_from(tmp_path):
     file = tmp_path / "m.csv"
     ti, pi, to, po = grid(range(0, 86, 5), [0], range(0, 86, 5), range(0, 181, 10))

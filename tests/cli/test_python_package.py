@@ -299,7 +299,7 @@ UP = [0.0, 0.0, 1.0]
         (
             lambda b: b.model("ward").eval([UP, UP], UP, ax=[0.1, 0.2, 0.3]),
             ValueError,
-            r"ward: shapes do not broadcast: .*ax \(3,\)",
+            r"ward: shapes do not broadcast: wi \(2, 3\), wo \(3,\), ax \(3,\)$",
         ),
         (
             lambda b: b.model("ward").albedo(0.5, samples=0),

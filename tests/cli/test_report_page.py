@@ -76,6 +76,16 @@ def made(folder, name, model):
     (folder / name / "runs.json").write_text(json.dumps(whole))
 
 
+def test_a_scene_that_was_not_rendered_is_left_out_and_named(tmp_path):
+    made(tmp_path, "rendered", "phong")
+    (tmp_path / "waiting").mkdir()
+    (tmp_path / "waiting/scene.json").write_text("{}", encoding="utf-8")
+    done = subprocess.run([TOOL, "report", tmp_path], capture_output=True, text=True)
+    assert done.returncode == 0 and "rendered" in done.stdout
+    assert f"{tmp_path / 'waiting'}: left out, it was not rendered" in done.stderr
+    assert "1 scene" in (tmp_path / "index.html").read_text(encoding="utf-8")
+
+
 @pytest.mark.skipif(CHROMIUM is None, reason="chromium is missing: the page is seen by nobody")
 def test_the_page_in_a_browser(tmp_path):
     made(tmp_path, "a-scene-with-a-long-name", "phong")

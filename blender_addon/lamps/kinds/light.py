@@ -155,6 +155,7 @@ class Light(Kind, ABC):
             sizeless=sizeless,
             met=has_importance(light) and not sizeless,
             uneven=not self.is_even(light, matrix),
+            distorted=self.is_distorted(matrix),
             sheet=self.sheet(item, light, matrix),
         )
 
