@@ -176,7 +176,7 @@ def _decoded(w, shape):
 
 def _seen_group(parts):
     """The group that computes the cones of directions towards a slot's lamp."""
-    vectors = (*_SLOT, "at", "view", "normal")
+    vectors = (*_SLOT, "at", "view", "normal", "true")
 
     def fill(w, found):
         here = parts.on(w, found)
@@ -454,7 +454,8 @@ def _wired(w, data, normal, tangent, parameters, of_slots, title):
         given |= parts.add("once", **given)
         given["anywhere"] = surface.anywhere
         frame = zip(("tangent", "bitangent", "normal"), surface.axes, strict=True)
-        here = {"at": surface.place, "view": surface.view, **dict(frame)}
+        here = {"at": surface.place, "view": surface.view, "true": surface.true_normal}
+        here |= dict(frame)
         given |= here | constants
         seen, lit = _seen_group(parts), _lamp_group(parts)
         for slot in of_slots:

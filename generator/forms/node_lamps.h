@@ -16,8 +16,9 @@
 // so that the model's formula runs once. Cycles drops closures with a small weight, so the cone of a small lamp is
 // widened until it carries kWidened of the light; that share of the light beside the lamp then counts twice. If the
 // cones of two lamps overlap, light in the overlap would count twice. If one of them is a rectangle or an ellipse and
-// the other is a much smaller ball or sun, as behind a window, the wide one has a cone beside the small one (cone_aside).
-// Otherwise the earlier lamp in the list, which is sorted by size with the widest first, is left to drawn directions.
+// the other is a much smaller ball or sun, as behind a window, the wide one has a cone beside the small one
+// (cone_aside). Otherwise the earlier lamp in the list, which is sorted by size with the widest first, is left to drawn
+// directions.
 //
 // The formulas run only as nodes (print/node_program.h), for which a division by 0 and the root of a negative number
 // give 0.
@@ -176,16 +177,17 @@ template <class T> struct ConeAt {
   Vec3<T> towards;  ///< unit vector along its axis
   T clear;          ///< the part of it that is above the horizon, or 0 if the lamp does not have so many cones
 };
-/// `normal`: see cone_of().
+/// `true_normal`: of the surface, which hides what is below it. Directions below a shading normal alone are not hidden,
+/// so f = 0 there already accounts for them.
 template <class T> ConeAt<T> cone_at(const LampSlot<T>& slot, const LampCone<T>& cone, const Vec3<T>& at,
-                                     const T& index, const Vec3<T>& normal) {
+                                     const T& index, const Vec3<T>& true_normal) {
   const LampCones<T>& of = cone.cones;
   const T along_row = T(2) * index / (of.count - T(1)) - T(1);
   const Vec3<T> middle = slot.place - at + of.row * along_row;
   ConeAt<T> out;
   out.towards = select(T(1.5) < slot.most, middle * (T(1) / sqrt(dot(middle, middle))), cone.towards);
   // This approximates the part of a disk above a line, to 0.02.
-  const T height = maximum(minimum(dot(out.towards, normal) / of.sine, T(1)), T(-1));
+  const T height = maximum(minimum(dot(out.towards, true_normal) / of.sine, T(1)), T(-1));
   const T part = height * (T(0.75) - T(0.25) * (height * height)) + T(0.5);
   out.clear = select(index < of.count, part, T(0));
   return out;

@@ -102,7 +102,7 @@ NodeProgram record_cone_at() {
     LampCone<Expr> cone;
     cone.towards = input3("towards");
     cone.cones = {Expr::input("count"), Expr::input("sine"), Expr(0.0), input3("row")};
-    const ConeAt<Expr> one = cone_at(slot_input(), cone, input3("at"), Expr::input("index"), input3("normal"));
+    const ConeAt<Expr> one = cone_at(slot_input(), cone, input3("at"), Expr::input("index"), input3("true"));
     p.output("axis", one.towards);
     p.output("clear", one.clear);
   });

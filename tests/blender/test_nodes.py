@@ -396,6 +396,40 @@ def test_a_bent_normal_takes_the_base_away(extension):
     assert abs(a - b) < 4.5 * math.hypot(of_a, of_b) + 1e-3 * b, (a, b, of_a, of_b)
 
 
+@pytest.mark.long
+def test_a_wide_lamp_and_a_bent_normal(extension):
+    """What of the lamp is below the horizon of a bent normal is not hidden by the surface. If the
+    rest of the lamp made up for it, the ball would be 38 % too bright."""
+
+    def bent(scene):
+        add_lamp(
+            scene, "AREA", "Wide", (2, -4, 2), (1.1, 0, 0.46), energy=600, shape="SQUARE", size=4.0
+        )
+        (ball,) = (item for item in scene.objects if item.type == "MESH")
+        material = ball.active_material
+        material.cycles.use_bump_map_correction = False
+        (node,) = extension.nodes.group_nodes(material)
+        tree = material.node_tree
+        geometry = tree.nodes.new("ShaderNodeNewGeometry")
+        leaning = tree.nodes.new("ShaderNodeVectorMath")
+        leaning.inputs[1].default_value = (-0.4, 0.3, -0.3)
+        unit = tree.nodes.new("ShaderNodeVectorMath")
+        unit.operation = "NORMALIZE"
+        for output, socket in (
+            (geometry.outputs["Normal"], leaning.inputs[0]),
+            (leaning.outputs[0], unit.inputs[0]),
+            (unit.outputs[0], node.inputs["Normal"]),
+        ):
+            tree.links.new(output, socket)
+
+    forms = ("nodes", "aimed")
+    off, error, _ = difference(
+        *(blocks_of(extension, "oren_nayar", {}, form, bent, 64) for form in forms)
+    )
+    print(f"{100 * off:+.2f} ± {100 * error:.2f} %")
+    assert abs(off) < 4.5 * error + 5e-3
+
+
 def test_a_choice_without_nodes_is_a_sentence(extension, empty):
     """Tables with several axes can't be made of nodes."""
     with pytest.raises(ValueError, match="Formula Nodes is only for Diffuse Term = Paper"):
