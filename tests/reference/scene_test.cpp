@@ -142,7 +142,9 @@ TEST_F(SceneTest, NamesFileKeyAndExpectation) {
       {"/lights/2/up", {0, 0, 2}, {"lights[2]: expected \"up\" not to be parallel"}},
       {"/objects/1", valid()["objects"][0], {"objects[1].name: \"ball\" is the name of an earlier object"}},
       // names
-      {"/materials/red/model", "lambart", {"materials.red.model: expected one of", "lambert", "found \"lambart\""}},
+      {"/materials/red/model",
+       "lambart",
+       {"materials.red.model: did you mean lambert? expected one of", "lambert", "found \"lambart\""}},
       {"/materials/red/parameters/rhu", 1, {"materials.red.parameters.rhu: lambert has no such parameter", "rho"}},
       {"/objects/0/material", "blue", {"objects[0].material: expected one of the materials red, found \"blue\""}},
       {"/objects/0/shape/type", "cube", {"objects[0].shape.type: expected one of sphere, quad", "found \"cube\""}},
