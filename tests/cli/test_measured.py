@@ -1034,7 +1034,7 @@ def test_a_scene_has_the_model_that_is_fitted(tmp_path):
     assert found["parameters"] == fit["fits"][0]["parameters"]
     for bad, expected in (
         ({"measured": file.name}, "material m: measured data are rendered by `brdfc render`"),
-        ({"measured": file.name, "as": "bling"}, "materials.m.as: expected"),
+        ({"measured": file.name, "as": "bling"}, "materials.m.as: did you mean blinn? expected"),
         ({"measured": file.name, "model": "blinn"}, "materials.m.model"),
         ({"measured": "none.csv"}, "materials.m.measured: "),
         ({"model": "blinn", "as": "ward"}, "materials.m.as"),
