@@ -209,19 +209,33 @@ template <class T> struct ConeAside {
   T clear;          ///< LampCone::clear, more than 1 by the share of the flat lamp that the small one covers
   T fits;           ///< 1 if the other lamp is small enough, otherwise 0
 };
+/// Where a direction meets the plane of a rectangle or an ellipse.
+template <class T> struct PlanePoint {
+  T slope;      ///< cosine between the direction and `away`: positive where the shining side is seen
+  T distance;   ///< from the shading point
+  Vec3<T> off;  ///< from the middle of the lamp
+};
+template <class T> PlanePoint<T> plane_point(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
+                                             const Vec3<T>& direction) {
+  const Vec3<T> centre = slot.place - at;
+  PlanePoint<T> out;
+  out.slope = dot(lamp.away, direction);
+  out.distance = dot(lamp.away, centre) / out.slope;
+  out.off = direction * out.distance - centre;
+  return out;
+}
+
 /// The part of a small disk of directions about `other` that lies within a rectangle or an ellipse.
 template <class T> T part_within(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
                                  const Vec3<T>& other, const T& other_radius) {
-  const Vec3<T> centre = slot.place - at;
-  const T slope = dot(lamp.away, other), distance = dot(lamp.away, centre) / slope;
-  const Vec3<T> off = other * distance - centre;
-  const T diameter = T(2) * other_radius * distance;
+  const PlanePoint<T> p = plane_point(slot, lamp, at, other);
+  const T diameter = T(2) * other_radius * p.distance;
   const auto within = [&](const T& left) { return maximum(minimum(left / diameter + T(0.5), T(1)), T(0)); };
-  const T x = dot(off, lamp.across), y = dot(off, lamp.along);
+  const T x = dot(p.off, lamp.across), y = dot(p.off, lamp.along);
   const T of_rectangle = within(lamp.half_across - abs(x)) * within(lamp.half_along - abs(y));
   const T from_middle = sqrt(sqr(x / lamp.half_across) + sqr(y / lamp.half_along));
   const T of_ellipse = within((T(1) - from_middle) * minimum(lamp.half_across, lamp.half_along));
-  return select(T(0) < slope, select(slot.kind > T(3.5), of_ellipse, of_rectangle), T(0));
+  return select(T(0) < p.slope, select(slot.kind > T(3.5), of_ellipse, of_rectangle), T(0));
 }
 /// The largest disk within a disk of radius `inner` about `towards` that does not meet one of radius `other_radius`
 /// about `other`: it touches the rims of both. Radii and distances are chords.
@@ -288,16 +302,14 @@ template <class T> T part_of_lamp(const LampCone<T>& cone, const T& emphasis, co
 template <class T> T met_part(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
                               const LampCone<T>& cone, const Vec3<T>& ray, const T& density) {
   const auto flat = slot.kind > T(2.5) && slot.kind<T(4.5), round = slot.kind> T(3.5);
-  const Vec3<T> centre = slot.place - at;
-  const T slope = dot(lamp.away, ray), distance = dot(lamp.away, centre) / slope;
-  const Vec3<T> off = ray * distance - centre;
-  const T seam = T(kNarrow) * distance;
-  const T x = (abs(dot(off, lamp.across)) - seam) / lamp.half_across;
-  const T y = (abs(dot(off, lamp.along)) - seam) / lamp.half_along;
+  const PlanePoint<T> p = plane_point(slot, lamp, at, ray);
+  const T seam = T(kNarrow) * p.distance;
+  const T x = (abs(dot(p.off, lamp.across)) - seam) / lamp.half_across;
+  const T y = (abs(dot(p.off, lamp.along)) - seam) / lamp.half_along;
   const T farthest = select(round, maximum(x, T(0)) * x + maximum(y, T(0)) * y, maximum(x, y));
-  const auto on_flat = farthest < T(1) && T(0) < slope;
+  const auto on_flat = farthest < T(1) && T(0) < p.slope;
   const T met = select(flat, select(on_flat, T(1), T(0)), select(length(ray - cone.towards) < cone.chord, T(1), T(0)));
-  const T emphasis = emphasis_at(slot, lamp, slope, sqr(distance), cone.solid_angle);
+  const T emphasis = emphasis_at(slot, lamp, p.slope, sqr(p.distance), cone.solid_angle);
   return met * part_of_lamp(cone, select(flat, emphasis, T(1)), density);
 }
 

@@ -101,7 +101,9 @@ NodeProgram record_cone_at() {
   return recorded([](Program& p) {
     LampCone<Expr> cone;
     cone.towards = input3("towards");
-    cone.cones = {Expr::input("count"), Expr::input("sine"), Expr(0.0), input3("row")};
+    cone.cones.count = Expr::input("count");
+    cone.cones.sine = Expr::input("sine");
+    cone.cones.row = input3("row");
     const ConeAt<Expr> one = cone_at(slot_input(), cone, input3("at"), Expr::input("index"), input3("true"));
     p.output("axis", one.towards);
     p.output("clear", one.clear);
