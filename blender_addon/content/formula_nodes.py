@@ -2,15 +2,14 @@
 """Builds a model's formulas from Blender's own Math nodes, which Cycles runs on every device.
 
 The tool writes formulas as lists of operations, in the extension's nodes/*.json, of which
-part_groups.py makes node groups. Here these are wired to the surface frame, to the lamps and to the
-closures that carry the result: a Toon BSDF for each lamp, one for a random direction, and Blender's
-own nodes for ideal reflection and refraction.
+part_groups.py makes node groups. Here these are wired to the surface frame and to the closures that
+carry the result: one for a random direction, those of lamps (formula_lamps.py), and Blender's own
+nodes for ideal reflection and refraction.
 """
 
 import math
 
-from ..lamps import slots
-from . import svm_constants
+from . import formula_lamps, svm_constants
 from .part_groups import Parts, add_group, make_group
 from .wiring import Wiring
 
@@ -70,7 +69,7 @@ class _Surface:
         return self.tangent, self.bitangent, self.normal
 
     def local(self, vector):
-        return _local(self.w, vector, self.axes)
+        return self.w.local(vector, self.axes)
 
     def world(self, vector):
         """Transforms a vector from the surface frame to world space."""
@@ -102,11 +101,6 @@ def bent_normal_group(data):
     return make_group("bent normal", ["bent normal", part], sockets, sockets, fill)
 
 
-def _local(w, vector, axes):
-    """Transforms a vector into a frame."""
-    return w.combine(*(w.vector("DOT_PRODUCT", vector, axis, output="Value") for axis in axes))
-
-
 def _random(w, surface, index):
     """Three random numbers in [0, 1), as brdfc_random() in OSL."""
 
@@ -130,252 +124,6 @@ def _direction(w, u, v):
     return w.combine(x, y, height)
 
 
-#: Outputs of the group that computes how a slot's lamp is seen from the shading point.
-_SEEN = [
-    ["towards", "VECTOR"],
-    ["drop", "FLOAT"],
-    ["of_cones", "FLOAT"],
-    ["solid_angle", "FLOAT"],
-    ["chord", "FLOAT"],
-    ["reach", "FLOAT"],
-    ["inner", "FLOAT"],
-    ["flat", "FLOAT"],
-    ["used", "FLOAT"],
-    ["active", "FLOAT"],
-    ["above", "FLOAT"],
-    ["count", "FLOAT"],
-    ["clear", "FLOAT"],
-]
-#: Vectors of a slot, and what its shape's first number consists of.
-_SLOT = ("place", "turn", "scale", "shape")
-_CODED = [["kind", "FLOAT"], ["most", "FLOAT"], ["plane", "FLOAT"]]
-_AXES = [
-    ["across", "VECTOR"],
-    ["along", "VECTOR"],
-    ["away", "VECTOR"],
-    ["half_across", "FLOAT"],
-    ["half_along", "FLOAT"],
-]
-#: Axes of the cones of a lamp.
-_CONES = [[f"axis {i}", "VECTOR"] for i in range(slots.MOST_CONES)]
-#: Larger than the angle between any two directions.
-_FAR = 4.0
-
-
-def _decoded(w, shape):
-    """The numbers that lamps/slots.py combines in the first number of a slot's shape."""
-    whole = w.separate(shape)[0]
-    code = w.math("FLOOR", w.math("DIVIDE", whole, slots.CODE))
-    plane = w.math("FLOOR", w.math("DIVIDE", code, slots.CODE))
-    return {
-        "kind": w.math("MULTIPLY_ADD", code, -slots.CODE, whole),
-        "most": w.math("MULTIPLY_ADD", plane, -slots.CODE, w.math("ADD", code, 1.0)),
-        "plane": plane,
-    }
-
-
-def _seen_group(parts):
-    """The group that computes the cones of directions towards a slot's lamp."""
-    vectors = (*_SLOT, "at", "view", "normal", "true")
-
-    def fill(w, found):
-        here = parts.on(w, found)
-        known = found | _decoded(w, found["shape"])
-        known |= here.add("axes", **known)
-        known |= here.add("cone", **known)
-        clear = 0.0
-        for i, (name, _) in enumerate(_CONES):
-            cone = here.add("cone_at", **known, index=float(i))
-            known[name] = cone["axis"]
-            clear = w.math("ADD", clear, cone["clear"])
-        return {name: (known | {"clear": clear})[name] for name, _ in outputs}
-
-    outputs = _SEEN + _CODED + _AXES + _CONES
-    content = [
-        "seen",
-        slots.CODE,
-        slots.MOST_CONES,
-        [parts.data[name] for name in ("axes", "cone", "cone_at")],
-    ]
-    inputs = [[name, "VECTOR"] for name in vectors]
-    return make_group("lamp seen", content, inputs, outputs, fill)
-
-
-def _point_of(w, towards, drop, anywhere, u):
-    """A uniformly distributed direction within the cone. `anywhere`: a random direction that
-    decides the azimuth."""
-    beside = w.vector("NORMALIZE", w.vector("CROSS_PRODUCT", towards, anywhere))
-    fallen = w.math("MULTIPLY", u, drop)
-    cosine = w.math("SUBTRACT", 1.0, fallen)
-    sine = w.math("SQRT", w.math("MULTIPLY", fallen, w.math("ADD", 1.0, cosine)))
-    return w.vector("ADD", w.scaled(towards, cosine), w.scaled(beside, sine))
-
-
-def _lamp_group(parts):
-    """The group that makes a lamp's closures, one for each of its cones, which carry the model's
-    value at one of its points, or the part of it that random directions leave. Cycles skips its
-    computations where the factor `lit` is 0."""
-    vectors = (*_SLOT, "towards", "at", "view", "tangent", "bitangent", "normal", "anywhere")
-    of_cone = ("chord", "flat", "room", "solid_angle", "clear", "count", "of_cones")
-    numbers = (*of_cone, "most", "drop", "lit", "u_0", "u_1", "u_2")
-    inputs = [[name, "VECTOR"] for name in vectors] + [[name, "FLOAT"] for name in numbers]
-    inputs += [["kind", "FLOAT"], *_AXES, *_CONES]
-    inputs += [[name, kind] for name, kind in parts.inputs("value").items() if name != "wi"]
-    known = {name for name, _ in inputs}
-    inputs += [[name, "FLOAT"] for name in svm_constants.VALUES if name not in known]
-
-    def fill(w, found):
-        here = parts.on(w, found)
-        point = _point_of(w, found["towards"], found["drop"], found["anywhere"], found["u_0"])
-        on_flat = here.add("flat", **found)
-        point = w.mix(found["flat"], point, on_flat["wi"], True)
-        frame = (found["tangent"], found["bitangent"], found["normal"])
-        at_point = here.add("value", **(found | {"wi": _local(w, point, frame)}))
-        cone = {name: found[name] for name in of_cone}
-        cone |= {"emphasis": on_flat["emphasis"], "u_2": found["u_2"]}
-        lobe = here.add("lobe", **at_point, **cone)
-        cones = []
-        for i, (name, _) in enumerate(_CONES):
-            half = w.half(found[name], found["view"])
-            toon = w.toon(lobe["color"], lobe["size"], half)
-            # The first factor is a constant, with which Cycles removes what a lamp never has.
-            may_exist = w.math("GREATER_THAN", found["most"], i + 0.5)
-            exists = w.math("MULTIPLY", may_exist, w.math("GREATER_THAN", found["count"], i + 0.5))
-            cones.append(w.shown(exists, toon) if i > 0 else toon)
-        return {"BSDF": w.shown(found["lit"], w.sum(cones))}
-
-    used = ("value", "flat", "lobe")
-    content = ["lamp", len(_CONES), {name: parts.data[name] for name in used}]
-    return make_group(f"{parts.title}: lamp", content, inputs, [["BSDF", "SHADER"]], fill)
-
-
-def _same_plane(w, lamp, other):
-    """1 for two flat lamps that lie beside each other in one plane, so that neither can hide the
-    other, otherwise 0."""
-    same = w.math("COMPARE", lamp["plane"], other["plane"], 0.5)
-    return w.math("MULTIPLY", same, w.math("GREATER_THAN", lamp["plane"], 0.5))
-
-
-class _Later:
-    """The later lamps, as seen along a lamp's axis: direction, radius and room of the nearest ball
-    or sun, and the room that all others leave. Flat lamps are not told apart from each other, which
-    would need more numbers than SVM can keep for eight of them."""
-
-    def __init__(self, w):
-        self.w, self.room, self.others = w, _FAR, _FAR
-        self.towards, self.radius = (0.0, 0.0, 0.0), 0.0
-
-    def add(self, beside, lamp):
-        w = self.w
-        of_flat = w.mix(lamp["flat"], _FAR, beside)
-        beside = w.mix(lamp["flat"], beside, _FAR)
-        closer = w.math("LESS_THAN", beside, self.room)
-        second = w.math("MAXIMUM", beside, self.room)
-        for room in (of_flat, second):
-            self.others = w.math("MINIMUM", self.others, room)
-        self.towards = w.mix(closer, self.towards, lamp["towards"], True)
-        self.radius = w.mix(closer, self.radius, lamp["as_other"])
-        self.room = w.math("MINIMUM", self.room, beside)
-
-
-#: What changes where a lamp has a cone beside another lamp. Only so many lamps can have that, from
-#: the widest, since SVM keeps the numbers of all lamps at a time.
-_OF_CONE = ("count", "clear", "chord", "axis 0")
-_MOST_ASIDE = 4
-#: What _keep_apart() needs to know of a lamp besides the inputs of the part "aside".
-_BOUNDS = ("towards", "reach", "flat", "used", "active", "above", "plane", *_OF_CONE)
-#: What it decides.
-_DECIDED = ("shown", "lit", "room", *_OF_CONE)
-
-
-def _keep_apart(w, parts, lamps, at, widest):
-    """Decides which lamps get closures, where, and how wide each may be, in a group that all models
-    share; sets _DECIDED of each lamp."""
-    kinds = {name: kind for name, kind in [*_SEEN, *_CODED, *_AXES, *_CONES]}
-    kinds |= dict.fromkeys(_SLOT, "VECTOR")
-    of_lamp = [*_BOUNDS, *parts.inputs("aside")]
-    taken = [name for name in dict.fromkeys(of_lamp) if name in kinds]
-
-    def sockets(names):
-        return [
-            [f"lamp {i} {name}", kinds.get(name, "FLOAT")]
-            for i in range(len(lamps))
-            for name in names
-        ]
-
-    def fill(inside, found):
-        of_lamps = [{name: found[f"lamp {i} {name}"] for name in taken} for i in range(len(lamps))]
-        _decide(inside, parts.on(inside, found), of_lamps, found["at"], widest)
-        return {
-            f"lamp {i} {name}": lamp[name] for i, lamp in enumerate(of_lamps) for name in _DECIDED
-        }
-
-    content = ["lamps apart", len(lamps), widest, taken, parts.data["aside"]]
-    inputs = [["at", "VECTOR"], *sockets(taken)]
-    group = make_group("lamps apart", content, inputs, sockets(_DECIDED), fill)
-    given = {f"lamp {i} {name}": lamp[name] for i, lamp in enumerate(lamps) for name in taken}
-    made = add_group(w, group, given | {"at": at}, "lamps apart")
-    for i, lamp in enumerate(lamps):
-        lamp |= {name: made[f"lamp {i} {name}"] for name in _DECIDED}
-
-
-def _decide(w, parts, lamps, at, widest):
-    """If two cones overlap, the lamp with the earlier slot, which is the wider one, gets a cone
-    beside the other if it is flat and the other is much smaller; otherwise it is left to random
-    directions.
-
-    Goes from the last slot to the first, so that the empty slots, which are constant to Cycles,
-    come first.
-    """
-    for lamp in lamps:
-        lamp["taken"] = w.mix(lamp["active"], -_FAR, lamp["reach"])
-    apart = {}
-    for i, lamp in enumerate(lamps):
-        for j, other in enumerate(lamps[i + 1 :], i + 1):
-            distance = w.vector("DISTANCE", lamp["towards"], other["towards"], output="Value")
-            distance = w.mix(_same_plane(w, lamp, other), distance, _FAR)
-            apart[i, j] = apart[j, i] = w.mix(other["used"], _FAR, distance)
-    for i, lamp in reversed(list(enumerate(lamps))):
-        later = _Later(w)
-        for j in range(len(lamps) - 1, i, -1):
-            beside = w.math("SUBTRACT", apart[i, j], lamps[j]["taken"])
-            later.add(beside, lamps[j])
-        room = w.math("MINIMUM", later.room, later.others)
-        free = w.math("LESS_THAN", lamp["reach"], room)
-        if i < _MOST_ASIDE:
-            free = w.math("MAXIMUM", free, _move_aside(w, parts, lamp, at, later))
-        shown = w.math("MULTIPLY", lamp["active"], free)
-        lamp["shown"] = shown
-        lamp["lit"] = w.math("MULTIPLY", shown, lamp["above"])
-        # No cone can be beside a lamp that has no closure.
-        lamp["as_other"] = w.mix(shown, _FAR, lamp["reach"])
-        room = w.math("MINIMUM", room, widest)
-        for j in range(i - 1, -1, -1):
-            beside = w.math("SUBTRACT", apart[i, j], lamps[j]["taken"])
-            room = w.math("MINIMUM", room, beside)
-        lamp["room"] = room
-
-
-def _move_aside(w, parts, lamp, at, later):
-    """Gives a flat lamp a single cone beside the nearest ball or sun, if they overlap; returns 1 if
-    it has that, otherwise 0."""
-    overlaps = w.math("LESS_THAN", later.room, lamp["reach"])
-    # Constant where no later slot has a ball or a sun, so that Cycles removes what follows.
-    has_later = w.math("LESS_THAN", later.room, _FAR - 0.1)
-    # Part of a lamp that the horizon cuts may be hidden: that is left to random directions.
-    whole = w.math("GREATER_THAN", lamp["clear"], w.math("SUBTRACT", lamp["count"], 0.01))
-    alone = w.math("LESS_THAN", lamp["reach"], later.others)
-    other = {"other": later.towards, "other_radius": later.radius}
-    made = parts.add("aside", at=at, **lamp, **other)
-    aside = w.math("MULTIPLY", lamp["flat"], has_later)
-    for condition in (overlaps, whole, alone, made["fits"]):
-        aside = w.math("MULTIPLY", aside, condition)
-    new = {"count": 1.0, "clear": made["clear"], "chord": made["chord"]}
-    lamp |= {name: w.mix(aside, lamp[name], value) for name, value in new.items()}
-    lamp[_CONES[0][0]] = w.mix(aside, lamp[_CONES[0][0]], made["axis"], True)
-    return aside
-
-
 def wire(tree, data, normal, tangent, parameters, outputs_of_slots, title):
     """Adds a model's nodes as a group. Returns the outputs by name: the BSDF, and the Albedo where
     the model consists of Blender's own closures only.
@@ -389,7 +137,9 @@ def wire(tree, data, normal, tangent, parameters, outputs_of_slots, title):
     values = {"Normal": (normal, "VECTOR"), "Tangent": (tangent, "VECTOR")}
     own = {name: f"parameter {name}" for name in parameters if name in kinds}
     values |= {own[name]: (parameters[name], kinds[name]) for name in own}
-    placed = [[f"lamp {i} {part}" for part in _SLOT] for i in range(len(outputs_of_slots))]
+    placed = [
+        [f"lamp {i} {part}" for part in formula_lamps.SLOT] for i in range(len(outputs_of_slots))
+    ]
     for names, slot in zip(placed, outputs_of_slots, strict=True):
         values |= {name: (output, "VECTOR") for name, output in zip(names, slot, strict=True)}
 
@@ -457,14 +207,9 @@ def _wired(w, data, normal, tangent, parameters, of_slots, title):
         here = {"at": surface.place, "view": surface.view, "true": surface.true_normal}
         here |= dict(frame)
         given |= here | constants
-        seen, lit = _seen_group(parts), _lamp_group(parts)
-        for slot in of_slots:
-            values = dict(zip(_SLOT, slot, strict=True))
-            lamps.append(values | add_group(w, seen, here | values, "lamp seen"))
-        _keep_apart(w, parts, lamps, surface.place, data["widest"])
+        lamps = formula_lamps.seen(w, parts, of_slots, here, data["widest"])
     shaders.append(_rest(w, parts, surface, given, lamps, data["narrow"]))
-    for lamp in lamps:
-        shaders.append(add_group(w, lit, given | lamp, "lamp")["BSDF"])
+    shaders += formula_lamps.closures(w, parts, lamps, given)
     return {"BSDF": w.sum(shaders)}
 
 
@@ -488,7 +233,7 @@ def _rest(w, parts, surface, given, lamps, narrow):
     hidden = w.math(
         "MULTIPLY", w.math("LESS_THAN", height, 0.0), w.math("SUBTRACT", 1.0, surface.strand)
     )
-    # From the last slot to the first, as in _keep_apart().
+    # From the last slot to the first, as formula_lamps decides which are shown.
     met = 0.0
     if lamps:
         here = {"at": surface.place, "ray": ray}

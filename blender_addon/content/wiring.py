@@ -121,6 +121,12 @@ class Wiring:
         self.give(node.inputs[0], vector)
         return list(node.outputs)
 
+    def local(self, vector, axes):
+        """Transforms a vector into a frame."""
+        return self.combine(
+            *(self.vector("DOT_PRODUCT", vector, axis, output="Value") for axis in axes)
+        )
+
     def half(self, a, b):
         """The normalized half vector of two directions."""
         return self.vector("NORMALIZE", self.mix(0.5, a, b, True))

@@ -7,7 +7,8 @@ Nothing is changed before apply().
 from .apply_restore import apply, is_converted, restore
 from .filter_glossy import warning
 from .node_values import KNOWN_SOCKETS, natives
-from .plans import LIMIT, Plan, plan
+from .planned_node import LIMIT, Plan
+from .plans import plan
 
 __all__ = [
     "KNOWN_SOCKETS",

@@ -19,7 +19,7 @@ PARTS = ("LampPlace", "LampTurn", "LampScale", "LampShape")
 EMPTY, BALL, SUN, RECTANGLE, ELLIPSE, SKY_SUN = range(6)
 #: The number of the shape of a rectangle or an ellipse is increased by CODE times the number of
 #: cones that it may have less one, and by CODE squared times the number of its plane, if there are
-#: others in that plane. Formula Nodes read both (content/formula_nodes.py), other shaders skip
+#: others in that plane. Formula Nodes read both (content/formula_lamps.py), other shaders skip
 #: them.
 CODE = 8.0
 #: Most cones of a rectangle. Formula Nodes have a closure for each.
