@@ -111,7 +111,7 @@ class Making(Job):
         except MeasuredError as error:
             self._refusals[path] = error.args[0]
         self._fitting = None
-        return 0
+        return 1
 
     def _build(self):
         share = self._building.step()

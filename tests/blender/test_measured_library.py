@@ -118,6 +118,27 @@ def test_a_folder_becomes_a_catalogue(extension, empty, folder, tmp_path):
     assert again.materials == made.materials and cats.read_text() == text
 
 
+def test_the_part_done_never_falls(module, folder, tmp_path, monkeypatch):
+    """A file whose fit was nearly done counts as done, whether it became a fit or was refused."""
+
+    class Fitting:
+        def __init__(self, path, *_, **__):
+            self.path, self.left, self.result = path, [0.5, 0.99], None
+
+        def step(self):
+            if self.left:
+                return self.left.pop(0)
+            if self.path.name == "broken.binary":
+                raise module.MeasuredError("damaged")
+            self.result = self.path.name
+            return None
+
+    monkeypatch.setattr(module, "Fitting", Fitting)
+    making = module.Making(folder, tmp_path / "measured.blend", "lambert")
+    shares = [making.step() for _ in range(3 * 4)]
+    assert shares == sorted(shares) and shares[2] == pytest.approx(shares[-1] / 4)
+
+
 @pytest.mark.long
 def test_the_operator_and_the_closest_model(extension, empty, tmp_path):
     write(tmp_path / "grey.csv", 0.5, 0.5, 0.5)
