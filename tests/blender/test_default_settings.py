@@ -162,6 +162,30 @@ def moving_material(extension, model="lambertian_specular"):
     return material
 
 
+@pytest.mark.parametrize(
+    ("kind", "watts", "warned"),
+    [("SUN", 1, False), ("SPOT", 1000, False), ("AREA", 10, False), ("AREA", 1000, True)],
+)
+def test_a_clamp_that_takes_no_light_is_no_finding(extension, new_file, kind, watts, warned):
+    """Blender clamps indirect light at 10 in a new file. Of formula nodes without a mirror that
+    takes light under bright area lamps alone; mirrors show clamped lamps in other surfaces."""
+    data = bpy.data.lights["Light"]
+    data.type, data.energy = kind, watts
+    if kind == "AREA":
+        bpy.data.objects["Light"].data.size = 1.0
+
+    def codes(model):
+        material = extension.api.new_material(model)
+        assert form_of(extension, material) == "nodes"
+        update(new_file)
+        return {w.code for w in extension.api.warnings(material, new_file)}
+
+    assert ("clamp_indirect" in codes("cook_torrance")) == warned
+    assert "clamp_mirror" in codes("coupled")
+    bpy.data.objects.remove(bpy.data.objects["Light"])
+    assert "clamp_indirect" not in codes("oren_nayar"), "without a lamp"
+
+
 def test_a_material_follows_the_scene(extension, new_file):
     """Whatever causes the change: the node stays, with values, links, animation and drivers."""
     few_samples(new_file, 64)
