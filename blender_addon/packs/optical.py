@@ -27,7 +27,7 @@ _INSIDE = ("attenuation", "per_length")
 
 def can_have(model_name):
     """Whether a model has parameters that describe its material."""
-    return any("optical" in p for p in pack.parameters(model_name).values())
+    return any("optical" in p for p in pack.model(model_name).parameters.values())
 
 
 def find(name):
@@ -65,8 +65,8 @@ def _absorption(model_name, substance, metres):
                     thickness=f"{metres:g}",
                 )
             )
-        roles = {p.get("optical") for p in pack.parameters(model_name).values()}
-        roles |= set(pack.fixed_optical(model_name).values())
+        roles = {p.get("optical") for p in pack.model(model_name).parameters.values()}
+        roles |= set(pack.model(model_name).fixed_optical.values())
         if not absorbs or "attenuation" not in roles:
             raise ValueError(
                 say(
@@ -102,9 +102,9 @@ _SAME = {"rel_tol": 2e-3, "abs_tol": 2e-4}
 def _check_fixed(model_name, substance, value_of):
     """Raises ValueError if a pack that is cut to a scene has fixed parameters, without sockets, of
     another substance. `value_of`: takes role and kind."""
-    fixed = pack.fixed(model_name)
+    fixed = pack.model(model_name).fixed
     other = []
-    for name, role in pack.fixed_optical(model_name).items():
+    for name, role in pack.model(model_name).fixed_optical.items():
         here = fixed[name] if isinstance(fixed[name], tuple) else (fixed[name],)
         value = value_of(role, "number" if len(here) == 1 else "color")
         value = value if value is None or isinstance(value, tuple) else (value,)
@@ -118,7 +118,7 @@ def _check_fixed(model_name, substance, value_of):
                 "This extension was built for one scene: {names} of {model} can't be those of "
                 "{substance}; build it again, or take the whole extension",
                 names=", ".join(other),
-                model=pack.model(model_name)["label"],
+                model=pack.model(model_name).label,
                 substance=substance.label,
             )
         )
@@ -136,7 +136,7 @@ def parameters(model_name, substance, thickness=None):
 
     _check_fixed(model_name, substance, value_of)
     found = {}
-    for name, p in pack.parameters(model_name).items():
+    for name, p in pack.model(model_name).parameters.items():
         if "optical" not in p:
             continue
         value = value_of(p["optical"], p["kind"])
@@ -145,7 +145,7 @@ def parameters(model_name, substance, thickness=None):
             found[name] = (
                 min(max(float(value), p["min"]), p["max"]) if single else tuple(map(float, value))
             )
-    if not found and not pack.fixed_optical(model_name):
+    if not found and not pack.model(model_name).fixed_optical:
         if substance.conductor:
             text = say(
                 "{model} has no parameter that says which metal it is made of", model=model_name

@@ -17,9 +17,10 @@ _PLAIN_WORLD = {"ShaderNodeBackground", "ShaderNodeOutputWorld"}
 
 
 def twin_of(node):
-    """Manifest entry of the twin of a node's model; None if it has no twin."""
-    made, (model_name, _) = nodes.manifest_entry(node), nodes.identity(node)
-    return pack.model(model_name)["representations"].get("twin") if made else None
+    """The twin of a node's model, as pack.Form; None if it has no twin."""
+    if nodes.manifest_entry(node) is None:
+        return None
+    return pack.model(nodes.identity(node).model).forms.get("twin")
 
 
 class SceneContext:
@@ -112,7 +113,8 @@ class NodeContext:
         self.form, self.schema = nodes.manifest_entry(node) or ({}, {})
         self.is_current = bool(self.form)
         if stood_in:
-            self.form = twin_of(node) or {}
+            twin = twin_of(node)
+            self.form = twin.entry if twin else {}
         in_cycles = self.of_scene.in_cycles
         #: The form if Cycles renders it, and the number of lamps that it aims at.
         self.cycles_form = self.form if in_cycles else {}

@@ -31,7 +31,7 @@ def guiding_spoils(at):
 def guiding_costs(at):
     """Path Guiding is on, and the form is Sampled. Measured: it renders correctly, with the same
     noise, but takes half as long again."""
-    sampled = at.form and nodes.identity(at.node)[1] == "sampled" and not at.stood_in
+    sampled = at.form and nodes.identity(at.node).form == "sampled" and not at.stood_in
     return when(sampled and at.scene.cycles.use_guiding)
 
 

@@ -41,7 +41,7 @@ def few_samples(scene, samples, size=16):
 
 def form_of(extension, material):
     (node,) = extension.nodes.group_nodes(material)
-    return extension.nodes.identity(node)[1]
+    return extension.nodes.identity(node).form
 
 
 def update(scene):
@@ -51,7 +51,8 @@ def update(scene):
 
 
 def native(extension, model):
-    return extension.pack.native_form(model)
+    form = extension.pack.model(model).native_form
+    return form and form.name
 
 
 def gallery(scene, materials):
@@ -370,6 +371,8 @@ def test_convert(extension, new_file):
     for osl in (False, True):
         new_file.cycles.shading_system = osl
         update(new_file)
-        wanted = "nodes" if not osl else extension.pack.automatic(plan.model, plan.values)
+        wanted = (
+            "nodes" if not osl else extension.pack.model(plan.model).automatic(plan.values).name
+        )
         assert form_of(extension, material) == wanted
         assert extension.api.warnings(material, new_file) == []

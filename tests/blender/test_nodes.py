@@ -365,7 +365,7 @@ def test_links_and_ranges(extension, empty, tool):
     number.outputs[0].default_value = 7.0
     beyond = render(empty)
     assert np.abs(beyond - plain).max() > 1e-3
-    number.outputs[0].default_value = extension.pack.parameters("ward")["ay"]["max"]
+    number.outputs[0].default_value = extension.pack.model("ward").parameters["ay"]["max"]
     np.testing.assert_array_equal(render(empty), beyond)
 
 
@@ -437,12 +437,12 @@ def test_a_choice_without_nodes_is_a_sentence(extension, empty):
     material = extension.api.new_material("ashikhmin_shirley", "aimed", diffuse="tabulated")
     with pytest.raises(ValueError, match="only for"):
         extension.api.switch_representation(material, "nodes")
-    assert extension.nodes.identity(extension.nodes.group_nodes(material)[0])[1] == "aimed"
+    assert extension.nodes.identity(extension.nodes.group_nodes(material)[0]).form == "aimed"
 
 
 def test_auto_takes_other_forms(extension, empty):
     for name in extension.api.models():
-        assert extension.pack.resolve(name, "auto") not in ("nodes", "twin")
+        assert extension.pack.model(name).resolve("auto").name not in ("nodes", "twin")
 
 
 def test_a_group_a_model_and_none_that_is_left(extension, empty):
