@@ -260,14 +260,21 @@ def test_noise_of_a_lamp_seen_from_the_side(extension):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "values", [{}, {"ax": 0.1, "ay": 0.3}, {"distribution": "beckmann"}], ids=str
+    ("model", "values"),
+    [
+        ("microfacet", {}),
+        ("microfacet", {"ax": 0.1, "ay": 0.3}),
+        ("microfacet", {"distribution": "beckmann"}),
+        ("glossy_reflector", {}),
+        ("phong_material", {"ks": 0.0}),
+    ],
+    ids=str,
 )
-def test_noise_of_a_metal(extension, values):
-    """The closure that Cycles has for these facets carries most of the light, so the noise is that
-    of the aimed form, which has the same closure."""
+def test_noise_of_a_metal(extension, model, values):
+    """Closures that Cycles has carry most of the light, so the noise is that of the aimed form,
+    which has similar ones."""
     nodes, aimed = (
-        blocks_of(extension, "microfacet", values, form, from_the_side, 64)
-        for form in ("nodes", "aimed")
+        blocks_of(extension, model, values, form, from_the_side, 64) for form in ("nodes", "aimed")
     )
     off, error, _ = difference(nodes, aimed)
     noise = nodes.var(0, ddof=1).sum() / aimed.var(0, ddof=1).sum()
@@ -367,6 +374,32 @@ def test_links_and_ranges(extension, empty, tool):
     assert np.abs(beyond - plain).max() > 1e-3
     number.outputs[0].default_value = extension.pack.model("ward").parameters["ay"]["max"]
     np.testing.assert_array_equal(render(empty), beyond)
+
+
+@pytest.mark.slow
+def test_facets_along_the_view_at_right_angles_to_it(extension):
+    """The view has no part across the normal then, and the facets no direction of their own."""
+
+    def plane(form):
+        found = []
+        for seed in range(4):
+            bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+            scene = bpy.context.scene
+            settings(extension, scene, 64, osl=form != "nodes", size=16)
+            scene.cycles.seed = seed
+            add_camera(scene, (0, 0, 4), (0, 0, 0), orthographic=1.0)
+            bpy.ops.mesh.primitive_plane_add()
+            material = extension.api.new_material("glossy_reflector", form)
+            bpy.context.object.data.materials.append(material)
+            add_lamp(scene, "POINT", "Ball", (0.3, 0, 3), energy=300, shadow_soft_size=0.3)
+            extension.api.see_lamps(scene)
+            found.append(render(scene)[..., 1].mean())
+        return np.mean(found), np.std(found, ddof=1) / 2
+
+    (a, of_a), (b, of_b) = map(plane, ("nodes", "aimed"))
+    print(f"{a:.4f} ± {of_a:.4f}, {b:.4f} ± {of_b:.4f}")
+    assert b > 0.1
+    assert abs(a - b) < 4.5 * math.hypot(of_a, of_b) + 3e-3 * b
 
 
 @pytest.mark.slow
