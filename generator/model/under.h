@@ -4,9 +4,9 @@
 //
 // A model declares them as under(wo), and registers that with BRDFC_UNDER after BRDFC_MODEL. For any parameters and
 // directions their sum is at most f cos(theta_i), but for 2e-4 of the model's light; weights are not negative. They are
-// of kinds that Blender has a node for: Diffuse, OrenNayar with the weight 1, DiffuseToon, GlossyToon, Ggx and
-// Beckmann, all about the surface's normal and, if anisotropic, the x axis. For all choices they are the same; a choice
-// may have the weight 0.
+// of kinds that Blender has a node for: Diffuse, OrenNayar with the weight 1, DiffuseToon, Ggx and Beckmann, all about
+// the surface's normal. Anisotropic facets are stretched along the x axis or the view. For all choices the kinds are
+// the same; a choice may have the weight 0.
 #pragma once
 
 #include <array>
