@@ -75,9 +75,10 @@ def refusal(material, node):
         )
     if model_name not in pack.model_names():
         return say("this version has no model {model!r}", model=model_name)
-    known = pack.model(model_name).parameters
+    model = pack.model(model_name)
+    known = model.parameters
     for name, value in nodes.all_values(node).items():
-        if name in pack.model(model_name).fixed or name in VECTORS:
+        if name in model.fixed or name in VECTORS:
             continue
         if name not in known:
             return say(

@@ -38,9 +38,9 @@ def _as_typed(value):
 
 def _use(material, node):
     model_name, representation = nodes.identity(node)
-    varying = nodes.varying(node)
-    parameters = dict(pack.model(model_name).fixed)
-    for name in pack.model(model_name).parameters:
+    model, varying = pack.model(model_name), nodes.varying(node)
+    parameters = dict(model.fixed)
+    for name in model.parameters:
         value = None if name in varying else nodes.get_value(node, name)
         parameters[name] = VARIES if value is None else _as_typed(value)
     asked = "auto" if nodes.is_automatic(node) else representation

@@ -23,8 +23,8 @@ _places = {}  # values and form: name of the preview, legend
 def _values(node):
     """A node's values by name, and the names of linked parameters."""
     model_name, _ = nodes.identity(node)
-    values = dict(pack.model(model_name).fixed)
-    values |= {name: nodes.get_value(node, name) for name in pack.model(model_name).parameters}
+    model = pack.model(model_name)
+    values = model.fixed | {name: nodes.get_value(node, name) for name in model.parameters}
     return values, [name for name, value in values.items() if value is None]
 
 

@@ -376,27 +376,33 @@ def test_links_and_ranges(extension, empty, tool):
     np.testing.assert_array_equal(render(empty), beyond)
 
 
+def mean_of_four(extension, form, size, fill):
+    """The mean of pictures with four seeds, and its standard error. `fill`: puts a material of the
+    form into a scene."""
+    found = []
+    for seed in range(4):
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        scene = bpy.context.scene
+        settings(extension, scene, 64, osl=form != "nodes", size=size)
+        scene.cycles.seed = seed
+        fill(scene, form)
+        found.append(render(scene)[..., 1].mean())
+    return np.mean(found), np.std(found, ddof=1) / 2
+
+
 @pytest.mark.slow
 def test_facets_along_the_view_at_right_angles_to_it(extension):
     """The view has no part across the normal then, and the facets no direction of their own."""
 
-    def plane(form):
-        found = []
-        for seed in range(4):
-            bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-            scene = bpy.context.scene
-            settings(extension, scene, 64, osl=form != "nodes", size=16)
-            scene.cycles.seed = seed
-            add_camera(scene, (0, 0, 4), (0, 0, 0), orthographic=1.0)
-            bpy.ops.mesh.primitive_plane_add()
-            material = extension.api.new_material("glossy_reflector", form)
-            bpy.context.object.data.materials.append(material)
-            add_lamp(scene, "POINT", "Ball", (0.3, 0, 3), energy=300, shadow_soft_size=0.3)
-            extension.api.see_lamps(scene)
-            found.append(render(scene)[..., 1].mean())
-        return np.mean(found), np.std(found, ddof=1) / 2
+    def plane(scene, form):
+        add_camera(scene, (0, 0, 4), (0, 0, 0), orthographic=1.0)
+        bpy.ops.mesh.primitive_plane_add()
+        material = extension.api.new_material("glossy_reflector", form)
+        bpy.context.object.data.materials.append(material)
+        add_lamp(scene, "POINT", "Ball", (0.3, 0, 3), energy=300, shadow_soft_size=0.3)
+        extension.api.see_lamps(scene)
 
-    (a, of_a), (b, of_b) = map(plane, ("nodes", "aimed"))
+    (a, of_a), (b, of_b) = (mean_of_four(extension, f, 16, plane) for f in ("nodes", "aimed"))
     print(f"{a:.4f} ± {of_a:.4f}, {b:.4f} ± {of_b:.4f}")
     assert b > 0.1
     assert abs(a - b) < 4.5 * math.hypot(of_a, of_b) + 3e-3 * b
@@ -406,26 +412,18 @@ def test_facets_along_the_view_at_right_angles_to_it(extension):
 def test_a_bent_normal_takes_the_base_away(extension):
     """Cycles would darken a base about it, and the random direction would not compensate."""
 
-    def bent(form):
-        found = []
-        for seed in range(4):
-            bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-            scene = bpy.context.scene
-            settings(extension, scene, 64, osl=form != "nodes", size=32)
-            scene.cycles.seed = seed
-            add_camera(scene, (0, -4, 0), (math.pi / 2, 0, 0), orthographic=2.2)
-            material = extension.api.new_material("coupled", form)
-            (node,) = extension.nodes.group_nodes(material)
-            vector = material.node_tree.nodes.new("ShaderNodeCombineXYZ")
-            for socket, value in zip(vector.inputs, (0.5, -0.7, 0.5), strict=True):
-                socket.default_value = value
-            material.node_tree.links.new(vector.outputs[0], node.inputs["Normal"])
-            add_sphere(scene, material, segments=64)
-            white_world(scene)
-            found.append(render(scene)[..., 1].mean())
-        return np.mean(found), np.std(found, ddof=1) / 2
+    def bent(scene, form):
+        add_camera(scene, (0, -4, 0), (math.pi / 2, 0, 0), orthographic=2.2)
+        material = extension.api.new_material("coupled", form)
+        (node,) = extension.nodes.group_nodes(material)
+        vector = material.node_tree.nodes.new("ShaderNodeCombineXYZ")
+        for socket, value in zip(vector.inputs, (0.5, -0.7, 0.5), strict=True):
+            socket.default_value = value
+        material.node_tree.links.new(vector.outputs[0], node.inputs["Normal"])
+        add_sphere(scene, material, segments=64)
+        white_world(scene)
 
-    (a, of_a), (b, of_b) = map(bent, ("nodes", "sampled"))
+    (a, of_a), (b, of_b) = (mean_of_four(extension, f, 32, bent) for f in ("nodes", "sampled"))
     assert abs(a - b) < 4.5 * math.hypot(of_a, of_b) + 1e-3 * b, (a, b, of_a, of_b)
 
 

@@ -207,7 +207,7 @@ def test_eval_says_what_is_wrong_with_its_input(stdin, words):
         (["sample", "lambert", "--seed", "3"], ["--count"]),
         (["albedo", "lambert", "--count", "1"], ["--count"]),
         (["check", "lambert", "--all"], ["--all"]),
-        (["check", "phng"], ["'phng'", "phong"]),
+        (["check", "phng"], ["'phng'", "did you mean phong?", "`brdfc list`"]),
     ],
 )
 def test_wrong_usage_is_one_line_and_status_2(args, words):
