@@ -12,6 +12,7 @@
 #include <array>
 
 #include "model/base_terms.h"
+#include "model/mirror_side.h"
 #include "model/model.h"
 
 namespace brdfc::inline model {
@@ -78,10 +79,7 @@ template <class T> Closure<T> power_facets_under(const Rgb<T>& weight, const T& 
   Closure<T> c(ClosureKind::Beckmann, weight * (wo.z * (e + T(1)) * sqrt(x * y)));
   c.alpha = facet_alpha(sqrt(x / T(2)));
   c.alpha_across = facet_alpha(sqrt(y / T(2)));
-  const T sine2 = sqr(wo.x) + sqr(wo.y);
-  const auto slanted = sine2 > T(1e-12);
-  const T over = T(1) / sqrt(maximum(sine2, T(1e-12)));
-  c.tangent = {select(slanted, wo.x * over, T(1)), select(slanted, wo.y * over, T(0)), T(0)};
+  c.tangent = mirror_side(wo);
   c.stretched = Tangent::View;
   return c;
 }
