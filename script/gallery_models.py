@@ -3,6 +3,7 @@
 """Makes a page for each model: three balls in Blender and the reference renderer, lobes, albedo.
 
     python script/gallery_models.py scenes MODELS.json OUT-FOLDER     writes OUT/ball-MODEL.json
+    python script/gallery_models.py pictures MODELS.json OUT-FOLDER   writes OUT/picture-MODEL.json
     python script/gallery_models.py pages MODELS.json REPORT-FOLDER PAGES-FOLDER
 
 MODELS.json is the output of `brdfc list --json`. The pages use the pictures and measurements that
@@ -20,7 +21,13 @@ from gallery_pages import measured, page_of, strip
 
 ROOT = Path(__file__).resolve().parent.parent
 #: Prefix of the names of models' scenes.
-PREFIX = "ball-"
+PREFIX, PICTURE = "ball-", "picture-"
+#: Ready-made materials by catalogue.
+LIBRARY = ROOT / "blender_addon" / "library" / "materials.json"
+#: The scene whose floor, lamps and room the pictures have; centres of their balls, in units of the
+#: radius.
+STUDIO, PICTURE_SPP = "as-fig8", 24
+PLACES = ((-4.1, 0.4), (-2.3, -1.6), (0.0, -2.6), (2.3, -1.6), (4.1, 0.4))
 #: Pixels and samples of the picture; radius of a ball, and distance between two.
 SIZE, SPP, RADIUS, STEP = (231, 84), 48, 0.5, 1.12
 #: Views in degrees from the normal: for lobes in the plane of incidence, and for lobes over the
@@ -327,6 +334,54 @@ def draw(model, formulas, pages):
     draw_albedo(np, plt, model, formulas, pages / f"{model['name']}-albedo.png")
 
 
+def materials_of(model, count):
+    """Materials of a model, in the form of a scene file: those of the library, then its first one
+    with other values of the parameter that varies between pictures."""
+    library = json.loads(LIBRARY.read_text(encoding="utf-8")).values()
+    entries = [e for catalog in library for e in catalog if e["model"] == model["name"]]
+    made = [
+        {"model": model["name"], "parameters": dict(e["values"])}
+        | ({"optical": e["substance"]} if "substance" in e else {})
+        for e in entries
+    ]
+    axis, first = axis_of(model), made[0]
+    for value in values_of(axis):
+        value = [value] * 3 if axis["kind"] == "color" else value
+        made.append(first | {"parameters": first["parameters"] | {axis["name"]: value}})
+    for material in made:
+        for p in model["parameters"]:
+            value = material["parameters"].get(p["name"])
+            if p["kind"] == "color" and isinstance(value, int | float):
+                material["parameters"][p["name"]] = [value] * 3
+    return [made[i % len(made)] for i in range(count)]
+
+
+def picture_scene(model):
+    """A knot and five balls of a model in the studio of the picture of all models."""
+    studio = json.loads((ROOT / "scenes" / f"{STUDIO}.json").read_text(encoding="utf-8"))
+    radius, names = 0.55, ["knot", *(f"ball_{i}" for i in range(len(PLACES)))]
+    floor, knot = studio["objects"][:2]
+    assert (floor["name"], knot["shape"]["type"]) == ("floor", "knot")
+    balls = [
+        {
+            "name": name,
+            "shape": {"type": "sphere", "radius": radius},
+            "transform": {"translate": [x * radius, y * radius, radius + 0.001]},
+            "material": name,
+        }
+        for name, (x, y) in zip(names[1:], PLACES, strict=True)
+    ]
+    made = zip(names, materials_of(model, len(names)), strict=True)
+    return studio | {
+        "name": PICTURE + model["name"],
+        "description": f"A knot and balls of {model['label']}.",
+        "camera": studio["camera"] | {"look_at": [0, 0.5, 0.87], "fov_y_degrees": 16.2},
+        "settings": studio["settings"] | {"width": 800, "height": 400, "spp": PICTURE_SPP},
+        "materials": {"floor": studio["materials"]["floor"], **dict(made)},
+        "objects": [floor, knot | {"name": "knot", "material": "knot"}, *balls],
+    }
+
+
 def scenes_with(name):
     """Links to the sections of gallery pages whose scenes use the model."""
     links = []
@@ -350,6 +405,11 @@ def page(model, scene, folder, pages):
         f"`{name}`: {model['paper']}.",
         "",
         f"{model['doc']} {claims(model)}",
+        "",
+        f"![{model['label']}]({name}-picture.jpg)",
+        "",
+        "Materials of the [library](../../library.md) and others, in Cycles at Blender's default",
+        f"settings with {PICTURE_SPP} samples, denoised: `script/gallery pictures {name}`.",
         "",
         "## Three balls under a lamp",
         "",
@@ -408,27 +468,29 @@ def overview(models, pages):
     lines = [
         "# A page for each model",
         "",
-        "For each model: three balls under one lamp, in Blender and by the reference renderer,",
-        "and the difference; its lobes; and its albedo. `script/gallery models` makes these pages",
-        "from the models' schemas.",
+        "For each model: a picture; three balls under one lamp, in Blender and by the reference",
+        "renderer, and the difference; its lobes; and its albedo. `script/gallery pictures` and",
+        "`script/gallery models` make these pages from the models' schemas.",
         "",
     ]
     for model in models:
         name = model["name"]
         if (pages / f"{name}.md").is_file():
-            lines += [f"[![{model['label']}]({name}.jpg)]({name}.md)", ""]
+            lines += [f"[![{model['label']}]({name}-picture.jpg)]({name}.md)", ""]
             lines += [f"**[{model['label']}]({name}.md)** {model['doc']}", ""]
     (pages / "overview.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def main():
-    if len(sys.argv) == 4 and sys.argv[1] == "scenes":
+    makers = {"scenes": ball_scene, "pictures": picture_scene}
+    if len(sys.argv) == 4 and sys.argv[1] in makers:
         models = json.loads(Path(sys.argv[2]).read_text(encoding="utf-8"))
         folder = Path(sys.argv[3])
         folder.mkdir(parents=True, exist_ok=True)
         for model in models:
-            file = folder / f"{PREFIX}{model['name']}.json"
-            file.write_text(json.dumps(ball_scene(model), indent=1), encoding="utf-8")
+            scene = makers[sys.argv[1]](model)
+            file = folder / f"{scene['name']}.json"
+            file.write_text(json.dumps(scene, indent=1), encoding="utf-8")
         return
     if len(sys.argv) != 5 or sys.argv[1] != "pages":
         sys.exit(__doc__)

@@ -73,8 +73,11 @@ def test_every_model_that_scatters_is_in_what_scripts_make(file):
 
 
 def test_every_model_has_its_page():
-    pages = {p.stem for p in (ROOT / "docs" / "gallery" / "models").glob("*.md")} - {"overview"}
+    folder = ROOT / "docs" / "gallery" / "models"
+    pages = {p.stem for p in folder.glob("*.md")} - {"overview"}
     assert pages == set(MODELS), "run script/gallery models"
+    pictures = {p.stem.removesuffix("-picture") for p in folder.glob("*-picture.jpg")}
+    assert pictures == set(MODELS), "run script/gallery pictures"
 
 
 def test_no_other_file_is_a_list_of_models():
