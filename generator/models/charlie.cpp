@@ -20,7 +20,9 @@
 // came from, so here the density is a power of 1.2 + x, where x is the component of wi along the surface and towards
 // the viewer. For r = 0.3 seen at 45 degrees this lowers the variance from 0.61 to 0.22 of the squared albedo; for a
 // view from above the power is 0.
-#include "model/base_terms.h"
+//
+// There is no base. One of Cycles' upright fibres and a ramp, 20 to 25 % off, made aimed forms noisier: 4 instead
+// of 2.9 times the Glossy node's variance under an area lamp, 14 instead of 9.1 under a smooth sky without a floor.
 #include "model/half_vector.h"
 
 namespace brdfc {
@@ -109,35 +111,6 @@ template <class T> struct Charlie {
     const Vec3<T> wi = {x * cosPhi - y * sinPhi, x * sinPhi + y * cosPhi, across * sin(psi)};
     const T p = pdf(wi, wo);
     return sample_if(above(wi, wo), wi, eval(wi, wo) * (wi.z / maximum(p, tiny<T>())), p);
-  }
-
-  /// Upright fibres as Cycles has them, which scatter back to the light as well, and a ramp with what they lack where
-  /// the light comes from the side: there (n.h)^2 is (zi + zo)^2 / (2 (1 + zi zo)). The spread of the fibres and their
-  /// weight were fitted to the part of f that depends on the azimuth.
-  ClosureSum<T> base(const Vec3<T>& wo) const {
-    constexpr double kStep = 1. / (kRampSize - 1);
-    const T zo = clamp01(wo.z);
-    const T spread = named("spread", minimum((T(0.8) + zo) / sqrt(T(2.6) + T(1) / r), T(1)));
-    const T upright = named("upright", (T(0.4) + (T(0.8) - T(0.9) * zo) * zo) * (T(1) - T(0.44) * r) *
-                                           (terminator == Soft ? T(1) - T(0.05) / r : T(1)));
-    Closure<T> fibres(ClosureKind::Velvet, tint * upright), ramp(ClosureKind::DiffuseRamp, tint);
-    fibres.roughness = spread;
-    ramp.ramp[0] = Rgb<T>(T(0));
-    T sum(0);
-    for (int i = 1; i < kRampSize; ++i) {
-      const T zi = T(i * kStep), cosine = zi * zo;
-      const T sin2 = maximum(T(1) - sqr(zi + zo) / (T(2) * (T(1) + cosine)), T(0));
-      const T side =
-          zi * D(sin2) * shape(zi, T(1 - i * kStep), zo, rise(wo)) - upright * velvet(spread, sin2, zi, zo, cosine);
-      const T rest = pi<T>() * maximum(side, T(0));
-      ramp.ramp[std::size_t(i)] = Rgb<T>(rest);
-      sum = sum + rest * T(i < kRampSize - 1 ? 2 * kStep : kStep);
-    }
-    // The weight is the albedo: Cycles follows closures as often as they weigh.
-    const T share = named("share", maximum(sum, T(0.01)));
-    ramp.weight = tint * share;
-    for (Rgb<T>& colour : ramp.ramp) colour = colour / share;
-    return {fibres, ramp};
   }
 };
 

@@ -19,7 +19,7 @@ constexpr const char* kOslWords = R"(
 
   Ci I N Ng Oi P Ps dPdtime dPdu dPdv dtime time u v
 
-  abs ashikhmin_velvet atan backfacing burley_diffuse_bsdf cbrt clamp cos diffuse_ramp dot emission exp getattribute glossy_toon isfinite log max
+  abs atan backfacing burley_diffuse_bsdf cbrt clamp cos diffuse_ramp dot emission exp getattribute glossy_toon isfinite log max
   microfacet min normalize oren_nayar_diffuse_bsdf phong_ramp pow raytype reflect reflection refraction sin sqrt
 
   area ceil cross distance floor hypot length mix mod noise rotate round sign smoothstep step transform
