@@ -32,6 +32,7 @@ from .library.measured import MeasuredLibrary
 from .measured import Measured, MeasuredError
 from .packs import kernel, pack
 from .packs.pack import PackError
+from .packs.parameter_values import equal_in_float32
 from .trees import shader_trees
 from .warnings import checks
 from .warnings.rows import Finding
@@ -92,17 +93,16 @@ _NO_MATERIAL = say("No material of this file has a reflection model of brdfc")
 
 def models():
     """Models by identifier: label, paper, doc, parameters, representations, as in the manifest."""
-    return {name: pack.model(name) for name in pack.model_names()}
+    return {name: pack.model(name).entry for name in pack.model_names()}
 
 
 def _checked(model_name, representation, given):
     """Returns the form to use and the parameter values in canonical form."""
     given = dict(given)
-    fixed = pack.fixed(model_name)
-    checked = {name: pack.check_value(model_name, name, v) for name, v in given.items()}
-    values = {name: v for name, v in checked.items() if name not in fixed}
-    representation = pack.resolve(model_name, representation, values)
-    return representation, values
+    model = pack.model(model_name)
+    checked = {name: model.check_value(name, v) for name, v in given.items()}
+    values = {name: v for name, v in checked.items() if name not in model.fixed}
+    return model.resolve(representation, values).name, values
 
 
 def prepare_material(material):
@@ -127,7 +127,7 @@ def new_material(model, representation="auto", **parameters):
     form, values = _checked(model, representation, parameters)
     representation = "auto" if representation == "auto" else form
     nodes.ensure_group(model, representation, values=values)
-    material = bpy.data.materials.new(pack.model(model)["label"])
+    material = bpy.data.materials.new(pack.model(model).label)
     try:
         tree = nodes.empty_tree(material)
         node = nodes.add_group_node(tree, model, representation, values)
@@ -274,7 +274,7 @@ def set_parameters(material, node=None, **parameters):
 
 def _set(node, what, parameters):
     editable.check(node.id_data)
-    model, representation = nodes.identity(node)[0], nodes.form_in_script(node)
+    model, representation = nodes.identity(node).model, nodes.form_in_script(node)
     lean_node = nodes.is_baked(node)
     _, values = _checked(model, "auto" if lean_node else representation, parameters)
     present = nodes.sockets(node)
@@ -282,7 +282,7 @@ def _set(node, what, parameters):
         if (
             lean_node
             and name not in present
-            and not pack.equal_in_float32(value, nodes.get_value(node, name))
+            and not equal_in_float32(value, nodes.get_value(node, name))
         ):
             raise ValueError(
                 f"{name!r} of {what} is {nodes.get_value(node, name)!r}, the only value of a lean "
@@ -303,7 +303,8 @@ def set_kernel(group, curve):
     largest. Raises ValueError for a node of another model, and where a height is not positive or
     too small beside the largest; in that case nothing is changed.
     """
-    if not nodes.is_ours(argument_checks.node(group)) or nodes.identity(group)[0] != kernel.MODEL:
+    is_ours = nodes.is_ours(argument_checks.node(group))
+    if not is_ours or nodes.identity(group).model != kernel.MODEL:
         raise ValueError(
             say(
                 "Node {node!r}: expected a node of the model {model!r}",
@@ -334,7 +335,7 @@ def set_substance(material, substance, node=None, thickness=None):
 
     node = _the_node(material, node)
     found = optical.find(substance)
-    values = optical.parameters(nodes.identity(node)[0], found, thickness)
+    values = optical.parameters(nodes.identity(node).model, found, thickness)
     for note in found.notes:
         print(f"brdfc: {note}")
     _set(node, say("material {name!r}", name=material.name), values)
@@ -353,7 +354,7 @@ def get_parameters(material, node=None):
     those that a link controls."""
     node = _the_node(material, node)
     model_name, _ = nodes.identity(node)
-    values = {name: nodes.get_value(node, name) for name in pack.parameters(model_name)}
+    values = {name: nodes.get_value(node, name) for name in pack.model(model_name).parameters}
     return {name: value for name, value in values.items() if value is not None}
 
 
@@ -366,7 +367,8 @@ def switch_representation(material, representation, node=None):
     for one in chosen:
         editable.check(one.id_data)
         if representation != "auto":
-            pack.resolve(nodes.identity(one)[0], representation, nodes.constants(one))
+            model = pack.model(nodes.identity(one).model)
+            model.resolve(representation, nodes.constants(one))
     for one in chosen:
         nodes.switch(one, representation)
     for tree in dict.fromkeys(one.id_data for one in chosen):

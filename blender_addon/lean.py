@@ -228,12 +228,13 @@ class Baking(Job):
                         own=before["generator"],
                     )
                 )
-            # pack.reason_unavailable() expects None for parameters that vary.
+            # Form.refusal() expects None for parameters that vary.
             given = {k: None if v == usage.VARIES else v for k, v in entry["parameters"].items()}
-            model = entry["model"]
-            form = pack.resolve(model, entry["representation"], given)
+            form = pack.model(entry["model"]).resolve(entry["representation"], given)
             known = set(bpy.data.node_groups)
-            group = nodes.ensure_group(model, form, baked=before["hash"], albedo=albedo)
+            group = nodes.ensure_group(
+                entry["model"], form.name, baked=before["hash"], albedo=albedo
+            )
         # The list of lamps may be new as well; it is removed with the last group that reads it.
         self._made += [group] if group not in known else []
         return group

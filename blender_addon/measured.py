@@ -199,7 +199,7 @@ def as_pairs(lobes):
             say("Expected at most {most} lobes, got {count}", most=most, count=len(pairs))
         )
     for model, _ in pairs:
-        if pack.model(model).get("two_sided"):
+        if pack.model(model).entry.get("two_sided"):
             raise ValueError(
                 say("{model!r} lets light through: expected models that reflect", model=model)
             )

@@ -184,7 +184,7 @@ def describe(bpy, loader, scene, job, samples):
         forms = []
         for node in nodes.group_nodes(material):
             model, representation = nodes.identity(node)
-            entry = pack.representation(model, representation)
+            entry = pack.model(model).forms[representation].entry
             keep = ("closures", "slots", "operations", "error", "warnings")
             forms.append(
                 {"model": model, "representation": representation}

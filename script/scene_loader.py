@@ -61,6 +61,7 @@ class SceneLoader:
         self.automatic = self.module("groups.automatic")
         self.nodes = self.module("groups.nodes")
         self.pack = self.module("packs.pack")
+        self.parameter_values = self.module("packs.parameter_values")
 
     def module(self, name):
         """A module of the extension."""
@@ -227,13 +228,12 @@ class SceneLoader:
                     textures[key] = self._texture(parameter.get("texture"))
                 else:
                     try:
-                        values[key] = self.pack.check_value(model, key, parameter.value)
+                        values[key] = self.pack.model(model).check_value(key, parameter.value)
                     except ValueError as error:
                         raise ValueError(f"{view.file}: {parameter.path}: {error}") from error
-        defaults = self.pack.canonical(
-            {p["name"]: p["default"] for p in self.pack.parameters(model).values()}
-        )
-        defaults |= self.pack.fixed(model)
+        schema = self.pack.model(model).parameters
+        defaults = self.parameter_values.canonical({n: p["default"] for n, p in schema.items()})
+        defaults |= self.pack.model(model).fixed
         if representation is None:
             representation = (
                 view.get("representation").text() if view.has("representation") else "auto"
@@ -246,7 +246,7 @@ class SceneLoader:
                 node = material.node_tree.nodes["Glossy BSDF"]
             else:
                 raise view.error(f"a material to which Blender's {representation} node was fitted")
-            colors = [k for k, p in self.pack.parameters(model).items() if p["kind"] == "color"]
+            colors = [k for k, p in schema.items() if p["kind"] == "color"]
             targets = {colors[0]: node.inputs[NATIVE[representation][1]]} if colors else {}
         else:
             try:

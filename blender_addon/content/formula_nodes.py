@@ -215,10 +215,14 @@ def _wired(w, data, normal, tangent, parameters, of_slots, title):
 
 def _of_base(w, closure, given, surface):
     """A closure of the base."""
-    found = {name: given[of] for name, of in closure.items() if name != "kind"}
+    found = {name: given[of] for name, of in closure.items() if name not in ("kind", "along")}
     if closure["kind"] == "cone":
         return w.toon(found["weight"], found["size"], surface.normal, found["smooth"], "DIFFUSE")
-    stretched = (found["anisotropy"], surface.tangent) if "anisotropy" in found else None
+    tangent = surface.tangent
+    if closure.get("along") == "view":
+        # Cycles takes the part across the normal, which the view alone does not always have.
+        tangent = w.vector("ADD", surface.view, w.scaled(tangent, 1e-3))
+    stretched = (found["anisotropy"], tangent) if "anisotropy" in found else None
     roughness = found.get("roughness", 0.0)
     return w.bsdf(closure["kind"], found["weight"], surface.normal, roughness, stretched)
 

@@ -9,7 +9,7 @@ import json
 from .. import lamps
 from ..common.i18n import say
 from ..packs import pack
-from ..packs.pack import choice_label
+from ..packs.parameter_values import choice_label
 from . import compiler, formula_nodes, stand_in, twin
 from .compiler import CompileError
 from .group_sockets import VECTORS, Interface, has_menus
@@ -28,39 +28,23 @@ def is_native(group):
     return "script_inputs" not in group[TAG]
 
 
-def has_albedo_script(model_name, representation):
-    """Whether a form's Albedo output needs a script of its own, which a group has on request
-    only."""
-    return pack.representation(model_name, representation).get("albedo_shader") is not None
-
-
-def has_albedo(model_name):
-    """Whether a model's forms can have an Albedo output: not where no table can hold it."""
-    entry = pack.model(model_name)
-    return not entry["scatter"] or entry.get("albedo") is not None
-
-
-def expected_inputs(model_name, representation):
+def expected_inputs(form):
     """Identifiers of the script node's inputs, with the types of their sockets."""
-    inputs = {
-        p["name"]: _SOCKET_TYPES[p["kind"]]
-        for p in pack.socket_parameters(model_name, representation).values()
-    }
+    inputs = {p["name"]: _SOCKET_TYPES[p["kind"]] for p in form.socket_parameters.values()}
     inputs |= {pack.NORMAL: "VECTOR", pack.TANGENT: "VECTOR"}
-    inputs |= dict.fromkeys(_lamp_inputs(model_name, representation), "VECTOR")
+    inputs |= dict.fromkeys(_lamp_inputs(form), "VECTOR")
     return inputs
 
 
-def _lamp_inputs(model_name, representation):
+def _lamp_inputs(form):
     """A form's inputs that the shared group of lamps feeds; a form may have fewer slots than
     that."""
-    slots = pack.representation(model_name, representation).get("lamps") or 0
-    if slots > lamps.SLOTS:
+    if form.lamps > lamps.SLOTS:
         raise pack.PackError(
-            f"manifest.json: {model_name} ({representation}): expected at most {lamps.SLOTS} "
-            f"lamps, got {slots}"
+            f"manifest.json: {form.model.name} ({form.name}): expected at most {lamps.SLOTS} "
+            f"lamps, got {form.lamps}"
         )
-    return lamps.part_names(slots)
+    return lamps.part_names(form.lamps)
 
 
 def scripts(group):
@@ -123,51 +107,50 @@ def _start_group(group, outputs):
     return group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
 
 
-def outputs_of(model_name, representation, albedo):
+def outputs_of(form, albedo):
     """Names of the outputs of a script form; `albedo` as in ensure_group()."""
-    if not has_albedo(model_name):
+    if not form.model.has_albedo:
         return [name for name in OUTPUTS if name != ALBEDO]
-    apart = has_albedo_script(model_name, representation)
-    return [name for name in OUTPUTS if albedo or not apart or name != ALBEDO]
+    return [name for name in OUTPUTS if albedo or not form.has_albedo_script or name != ALBEDO]
 
 
 def bent_normal_group(model_name):
     """The group that bends a normal as Cycles' glossy nodes bend theirs; None if the pack has no
     Formula Nodes of this model, whose part it is."""
-    if "nodes" not in pack.model(model_name)["representations"]:
+    form = pack.model(model_name).forms.get("nodes")
+    if form is None:
         return None
-    _, source = pack.source(model_name, "nodes")
+    _, source = form.source()
     return formula_nodes.bent_normal_group(json.loads(source))
 
 
-def fill_with_nodes(group, model_name, representation, source, twin_group):
+def fill_with_nodes(group, form, source, twin_group):
     """Fills a group with a form of Blender's own nodes. Its sockets are those of the other forms;
     but a twin has no use for a tangent. `twin_group`: the group of the model's twin, or None."""
     data = json.loads(source)
-    label = pack.model(model_name)["label"]
+    label, is_twin = form.model.label, form.name == "twin"
     # Outputs come first, so that a twin's sockets keep the identifiers that existing files have.
-    _add_outputs(group, OUTPUTS if representation == "twin" else ())
+    _add_outputs(group, OUTPUTS if is_twin else ())
     group_input = group.nodes.new("NodeGroupInput")
     group_input.location = (-300, 0)
     interface = Interface(group, group_input, {})
-    parameters = _relays(group, interface, pack.socket_parameters(model_name, representation))
+    parameters = _relays(group, interface, form.socket_parameters)
     normal, tangent = map(interface.vector, VECTORS)
-    if representation == "twin":
+    if is_twin:
         made = dict(
             zip(OUTPUTS, twin.wire(group, data, normal, parameters, f"{label} (twin)"), strict=True)
         )
     else:
         slots = []
-        if names := _lamp_inputs(model_name, representation):
+        if names := _lamp_inputs(form):
             shared = _add_lamps(group)
             slots = lamps.by_slot([shared.outputs[name] for name in names])
-        constants = pack.constants(model_name, representation)
         made = formula_nodes.wire(
             group,
             data,
             normal,
             tangent,
-            parameters | formula_nodes.numbers(constants),
+            parameters | formula_nodes.numbers(form.constants),
             slots,
             label,
         )
@@ -175,11 +158,11 @@ def fill_with_nodes(group, model_name, representation, source, twin_group):
         if twin_group is not None:
             sources = parameters | {pack.NORMAL: normal, pack.TANGENT: tangent}
             instead = _instance(group, twin_group, sources)
-        elif stand_in.has_node(model_name) and "baked" not in group[TAG]:
-            instead = stand_in.node_of(group, model_name, parameters, constants)
+        elif stand_in.has_node(form.model) and "baked" not in group[TAG]:
+            instead = stand_in.node_of(group, form, parameters)
         if instead is not None:
             made = stand_in.add_in_eevee(group, made, instead)
-    if representation != "twin":
+    if not is_twin:
         _add_outputs(group, made)
     group_output = group.nodes.new("NodeGroupOutput")
     for name, output in made.items():
@@ -203,32 +186,32 @@ def _relays(group, interface, parameters, without=()):
     return found
 
 
-def fill_with_form(group, model_name, native, with_osl, group_of):
+def fill_with_form(group, native, with_osl, group_of):
     """Fills a group with the form `native` of Blender's own nodes, in place of another form. For
     choices that this form lacks, the group shows the model's twin. Sockets stay. `group_of`: finds
     or makes the group of a form."""
-    form = group_of(model_name, native)
+    inner = group_of(native)
     tag = group[TAG]
-    _add_outputs(group, outputs_of(model_name, with_osl, tag["with_albedo"]))
+    _add_outputs(group, outputs_of(with_osl, tag["with_albedo"]))
     group_input, group_output = (group.nodes.new(f"NodeGroup{end}") for end in ("Input", "Output"))
     group_input.location, group_output.location = (-500, 0), (400, 0)
     interface = Interface(group, group_input, tag.get("sockets", {}))
-    parameters = pack.socket_parameters(model_name, with_osl)
+    parameters = with_osl.socket_parameters
     # The form has its own sockets for choices. Where those are menus they take no number.
     menus = {
         name
-        for name in form[TAG]["sockets"].keys() & parameters.keys()
+        for name in inner[TAG]["sockets"].keys() & parameters.keys()
         if has_menus() and parameters[name]["kind"] == "choice"
     }
     new_menus = menus - interface.sockets.keys()
     sources = _relays(group, interface, parameters, without=menus)
     sources |= {name: interface.vector(name) for name in VECTORS}
-    made = _instance(group, form, sources | {name: interface.output(name) for name in menus})
+    made = _instance(group, inner, sources | {name: interface.output(name) for name in menus})
     for name in new_menus:  # a menu has its items, of which one is the default, from its link
         interface.sockets[name].default_value = choice_label(parameters[name]["default"])
-    limits = {n: v for n, v in pack.form_values(model_name, native).items() if n in sources}
+    limits = {n: v for n, v in native.only.items() if n in sources}
     if limits:
-        made = _only_where(group, model_name, limits, sources, made, group_of)
+        made = _only_where(group, native.model, limits, sources, made, group_of)
     for socket in group_output.inputs:
         if socket.name in made:
             group.links.new(made[socket.name], socket)
@@ -244,16 +227,16 @@ def _instance(group, inner, sources):
     return stand_in.twin_of(group, inner, inputs)
 
 
-def _only_where(group, model_name, limits, sources, made, group_of):
+def _only_where(group, model, limits, sources, made, group_of):
     """Outputs by name: `made` where the choices have these values, those of the twin elsewhere."""
     w, chosen = Wiring(group), None
     for name, only in limits.items():
-        index = pack.parameters(model_name)[name]["choices"].index(only)
+        index = model.parameters[name]["choices"].index(only)
         same = w.math("COMPARE", sources[name], index, 0.25)
         chosen = same if chosen is None else w.math("MULTIPLY", chosen, same)
-    if "twin" not in pack.model(model_name)["representations"]:
+    if "twin" not in model.forms:
         return made | {"BSDF": w.shown(chosen, made["BSDF"])}
-    twin_ = _instance(group, group_of(model_name, "twin"), sources)
+    twin_ = _instance(group, group_of(model.forms["twin"]), sources)
     return twin_ | made | stand_in.choose(group, chosen, twin_, made)
 
 
@@ -272,25 +255,24 @@ def _add_script(group, text, what):
     return script
 
 
-def fill_with_scripts(group, model_name, representation, texts, twin_group):
+def fill_with_scripts(group, form, texts, twin_group):
     """`texts`: of the script, and of the Albedo output's own script where that exists and was
     requested. `twin_group`: the group of the model's twin, or None."""
-    what = f"{model_name} ({representation})"
-    apart = has_albedo_script(model_name, representation)
-    outputs = outputs_of(model_name, representation, len(texts) > 1)
+    what = f"{form.model.name} ({form.name})"
+    outputs = outputs_of(form, len(texts) > 1)
     group_input, group_output = _start_group(group, outputs)
     group_output.is_active_output = True
     group_input.location, group_output.location = (-500, 0), (300, 0)
     script = _add_script(group, texts[0], what)
     from_scripts = {s.identifier: s for s in script.outputs}
     tag = group[TAG]
-    tag["script_inputs"] = expected_inputs(model_name, representation)
-    tag["albedo_apart"] = apart or not has_albedo(model_name)
+    tag["script_inputs"] = expected_inputs(form)
+    tag["albedo_apart"] = form.has_albedo_script or not form.model.has_albedo
     if len(texts) > 1:
         albedo = _add_script(group, texts[1], f"{what}, the Albedo output")
         albedo.name = albedo.label = ALBEDO
         albedo.location = (0, -400)
-        only_light = {pack.TANGENT, *_lamp_inputs(model_name, representation)}
+        only_light = {pack.TANGENT, *_lamp_inputs(form)}
         tag["albedo_inputs"] = {
             name: kind for name, kind in tag["script_inputs"].items() if name not in only_light
         }
@@ -305,11 +287,11 @@ def fill_with_scripts(group, model_name, representation, texts, twin_group):
 
     inputs = {s.identifier: s for s in script.inputs}
     interface = Interface(group, group_input, tag.get("sockets", {}))
-    for name, parameter in pack.socket_parameters(model_name, representation).items():
+    for name, parameter in form.socket_parameters.items():
         interface.parameter(name, inputs[name], parameter)
     for name in VECTORS:
         group.links.new(interface.vector(name), inputs[name])
-    if lamp_inputs := _lamp_inputs(model_name, representation):
+    if lamp_inputs := _lamp_inputs(form):
         shared = _add_lamps(group)
         for name in lamp_inputs:
             group.links.new(shared.outputs[name], inputs[name])
@@ -317,9 +299,8 @@ def fill_with_scripts(group, model_name, representation, texts, twin_group):
     instead = None
     if twin_group is not None:
         instead = _instance(group, twin_group, sources)
-    elif stand_in.has_node(model_name) and "baked" not in tag:
-        constants = pack.constants(model_name, representation)
-        instead = stand_in.node_of(group, model_name, sources, constants)
+    elif stand_in.has_node(form.model) and "baked" not in tag:
+        instead = stand_in.node_of(group, form, sources)
     if instead is not None:
         tag["stands_in"] = True
         runs = _add_script(group, stand_in.text(), "what tells where shaders run")

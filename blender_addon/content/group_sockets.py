@@ -4,7 +4,7 @@
 import bpy
 
 from ..packs import pack
-from ..packs.pack import choice_label
+from ..packs.parameter_values import choice_label
 
 
 def _output(group_input, socket):

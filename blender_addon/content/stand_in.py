@@ -71,14 +71,15 @@ _NODES = {
 }
 
 
-def has_node(model_name):
-    return model_name in _NODES
+def has_node(model):
+    """Whether a node of Blender can stand in for a model."""
+    return model.name in _NODES
 
 
-def node_of(group, model_name, parameters, constants):
-    """The outputs, by name, of the node that stands in for a model. `parameters`: outputs by name.
-    `constants`: values of the parameters without a socket."""
-    kind, given = _NODES[model_name]
+def node_of(group, form, parameters):
+    """The outputs, by name, of the node that stands in for a form. `parameters`: outputs by
+    name."""
+    kind, given = _NODES[form.model.name]
     node = group.nodes.new(kind)
     if kind == "ShaderNodeBsdfMetallic":
         node.fresnel_type = "PHYSICAL_CONDUCTOR"
@@ -88,7 +89,7 @@ def node_of(group, model_name, parameters, constants):
         if name in parameters:
             group.links.new(parameters[name], socket)
         else:
-            socket.default_value = constants[name]
+            socket.default_value = form.constants[name]
 
     for name, source in given.items():
         if isinstance(source, str):

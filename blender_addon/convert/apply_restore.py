@@ -40,7 +40,7 @@ def apply(plans):
 
 
 def _values(part):
-    return {k: pack.check_value(part.model, k, v) for k, v in part.values.items()}
+    return {k: pack.model(part.model).check_value(k, v) for k, v in part.values.items()}
 
 
 def is_converted(node):
@@ -76,7 +76,7 @@ def restore(material):
     for group, before in pairs:
         if before is None:  # refuses before anything is changed
             for model in (group, *filter(nodes.is_ours, _helpers(group))):
-                pack.resolve(nodes.identity(model)[0], "twin", nodes.all_values(model))
+                pack.model(nodes.identity(model).model).resolve("twin", nodes.all_values(model))
     own = [group for group, _ in pairs if group.id_data == material.node_tree]
     corrected = [bool(group.get(CORRECTED, True)) for group in own]
     shared = dict.fromkeys(group.id_data for group, _ in pairs if group not in own)

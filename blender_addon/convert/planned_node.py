@@ -48,7 +48,7 @@ class Part:
 
     @property
     def label(self):
-        label = pack.model(self.model)["label"]
+        label = pack.model(self.model).label
         return say("{model} over {base}", model=label, base=self.base.label) if self.base else label
 
 

@@ -15,6 +15,7 @@ from ..nearest import layer, native_bsdf
 from ..nearest.native_bsdf import Native
 from ..nearest.nearest_model import base_of, candidates, matte_of, nearest, scale_of, with_width
 from ..packs import device, pack
+from ..packs.parameter_values import canonical
 from ..trees import animation, shader_trees
 from .filter_glossy import is_filtered
 from .instances import Instances
@@ -87,7 +88,7 @@ def _glass_of(material, node, inputs, color, tint, **more):
         said = say(
             "its {socket} is not white, and {model} has no colour",
             socket=Sentence(color),
-            model=pack.model(_CLEAR)["label"],
+            model=pack.model(_CLEAR).label,
         )
         raise Refused(said)
     values = {} if inputs.follows("IOR") else {"ior": inputs.constant("IOR")}
@@ -100,7 +101,7 @@ def _check_ranges(parts):
     """Raises Refused if a parameter would have a value that its model does not take."""
     for part in parts:
         for name, value in part.values.items():
-            parameter = pack.parameters(part.model).get(name, {})
+            parameter = pack.model(part.model).parameters.get(name, {})
             low, high = parameter.get("min"), parameter.get("max")
             if low is None or all(low <= c <= high for c in np.atleast_1d(value)):
                 continue
@@ -124,10 +125,8 @@ def _shown(without_osl):
     def has(model, values):
         if model not in pack.model_names():
             return False
-        form = pack.native_form(model)
-        if form is None or not without_osl:
-            return True
-        return pack.reason_unavailable(model, form, pack.canonical(values)) is None
+        form = pack.model(model).native_form
+        return form is None or not without_osl or form.refusal(canonical(values)) is None
 
     return has
 
@@ -187,7 +186,7 @@ def _lacking(natives, colors):
         return say(
             "its nearest model, {model}, which sends {percent} % of the light in other directions "
             "than the node, needs Open Shading Language for its values",
-            model=pack.model(fit.candidate.model)["label"],
+            model=pack.model(fit.candidate.model).label,
             percent=in_percent(max(error for _, error in fit.found)),
         )
     models = dict.fromkeys(c.model for c in candidates(natives[0]))

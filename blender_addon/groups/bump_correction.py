@@ -16,7 +16,7 @@ CODE = "bump_correction"
 
 def _is_needed_off(material):
     entries = (nodes.manifest_entry(node) for node in nodes.group_nodes(material))
-    return any(CODE in entry[0].get("warnings", []) for entry in entries if entry)
+    return any(CODE in entry.form.get("warnings", []) for entry in entries if entry)
 
 
 def prepare(material):

@@ -7,6 +7,7 @@ holds both source and bytecode, so a saved file renders where the extension is n
 
 import contextlib
 import json
+from typing import NamedTuple
 
 import bpy
 
@@ -14,9 +15,9 @@ from .. import lamps
 from ..common import editable
 from ..common.i18n import say
 from ..content import group_content, part_groups, stand_in
-from ..content.group_content import ALBEDO, has_albedo_script, is_native, script_problem
+from ..content.group_content import ALBEDO, is_native, script_problem
 from ..packs import device, pack
-from ..packs.pack import choice_label
+from ..packs.parameter_values import canonical, choice_label, equal_in_float32
 from ..trees import animation, shader_trees
 
 TAG = pack.TAG
@@ -35,7 +36,7 @@ def empty_tree(owner):
 def is_fitted(node):
     """Whether a group node's form approximates the model by fitted closures or nodes. Other forms
     reproduce the model on average."""
-    return identity(node)[1] in ("twin", "fitted")
+    return identity(node).form in ("twin", "fitted")
 
 
 def source_text(group):
@@ -50,16 +51,16 @@ def is_ours(node):
     return node.bl_idname == "ShaderNodeGroup" and tree is not None and TAG in tree
 
 
-def find_group(model_name, representation, albedo=False, automatic=None):
-    """The group of the current version of a shader, if the file has an intact one; `albedo` as in
-    ensure_group. `automatic`: the form to take where OSL runs, of a group that adapts to the
+def find_group(form, albedo=False, with_osl=None):
+    """The group of the current version of a form, if the file has an intact one; `albedo` as in
+    ensure_group. `with_osl`: the form to take where OSL runs, of a group that adapts to the
     scene."""
-    albedo = albedo and has_albedo_script(model_name, automatic or representation)
-    digest = pack.digest(model_name, representation)
+    albedo = albedo and (with_osl or form).has_albedo_script
+    automatic = with_osl and with_osl.name
     for group in bpy.data.node_groups:
         tag = group.get(TAG)
-        if group.library is None and tag is not None and tag.get("digest") == digest:
-            same = (tag["model"], tag["representation"]) == (model_name, representation)
+        if group.library is None and tag is not None and tag.get("digest") == form.digest:
+            same = (tag["model"], tag["representation"]) == (form.model.name, form.name)
             has_albedo = tag["with_albedo"] if AUTO in tag else "albedo_inputs" in tag
             if same and tag.get(AUTO) == automatic and has_albedo == albedo and is_sound(group):
                 return group
@@ -118,39 +119,36 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False, va
     available. `baked`: hash of the extension in whose place the pack of the open file is in use
     (see pack.use). `albedo`: adds the Albedo output even if that takes a script with large tables.
     """
+    model = pack.model(model_name)
     if representation == "auto" and not baked:
-        with_osl = pack.automatic(model_name, values)
-        if pack.native_form(model_name) and not pack.is_native(model_name, with_osl):
-            return _ensure_automatic(model_name, with_osl, albedo)
-    representation = pack.resolve(model_name, representation, values)
-    if group := find_group(model_name, representation, albedo):
+        with_osl = model.automatic(values)
+        if model.native_form and not with_osl.is_native:
+            return _ensure_automatic(with_osl, albedo)
+    form = model.resolve(representation, values)
+    if group := find_group(form, albedo):
         _clear_fake_users(group)
         return group
-    with _new_group(model_name, representation, representation, albedo) as group:
+    with _new_group(form.name, form, albedo) as group:
         if baked:
             # The pack of the file is gone when the group is examined later.
-            entry = {
-                "of": baked,
-                "form": pack.representation(model_name, representation),
-                "parameters": pack.parameters(model_name),
-            }
+            entry = {"of": baked, "form": form.entry, "parameters": model.parameters}
             group[TAG]["baked"] = json.dumps(entry)
-        _fill(group, model_name, representation, albedo)
+        _fill(group, form, albedo)
     return group
 
 
-def _ensure_automatic(model_name, with_osl, albedo):
+def _ensure_automatic(with_osl, albedo):
     """The group that adapts to the scene; `with_osl`: its form where OSL runs."""
-    native = pack.native_form(model_name)
+    native = with_osl.model.native_form
     for form in (with_osl, native):
-        if group := find_group(model_name, form, albedo, with_osl):
+        if group := find_group(form, albedo, with_osl):
             _clear_fake_users(group)
             adapt_to_scene(group, device.lacks_osl(lamps.current_scene()))
             return group
-    with _new_group(model_name, "auto", with_osl, albedo) as group:
+    with _new_group("auto", with_osl, albedo) as group:
         tag = group[TAG]
-        tag[AUTO], tag["with_albedo"] = with_osl, albedo and has_albedo_script(model_name, with_osl)
-        tag["native_only"] = json.dumps(pack.form_values(model_name, native))
+        tag[AUTO], tag["with_albedo"] = with_osl.name, albedo and with_osl.has_albedo_script
+        tag["native_only"] = json.dumps(native.only)
         _change_form(group, native if device.lacks_osl(lamps.current_scene()) else with_osl)
     return group
 
@@ -165,24 +163,24 @@ def is_at_work():
 
 
 @contextlib.contextmanager
-def _new_group(model_name, name, form, albedo):
+def _new_group(name, form, albedo):
     """A new group with the sockets of a form, which the body of the with statement fills. If the
     body raises, the group and its parts are removed from the file."""
     known = set(bpy.data.node_groups)
-    parts = [name, *([ALBEDO] if albedo and has_albedo_script(model_name, form) else [])]
-    title = f"{pack.model(model_name)['label']} ({', '.join(parts)})"
+    parts = [name, *([ALBEDO] if albedo and form.has_albedo_script else [])]
+    title = f"{form.model.label} ({', '.join(parts)})"
     group = bpy.data.node_groups.new(title, "ShaderNodeTree")
     _unfinished.append(group)
     try:
         group.color_tag = "SHADER"
-        group.description = pack.model(model_name)["doc"]
+        group.description = form.model.doc
         group[TAG] = {
-            "model": model_name,
-            "representation": form,
-            "digest": pack.digest(model_name, form),
+            "model": form.model.name,
+            "representation": form.name,
+            "digest": form.digest,
             "made_by": pack.manifest()["generator"],
-            "choices": json.dumps(pack.form_choices(model_name, form)),
-            "only": json.dumps(pack.constants(model_name, form)),
+            "choices": json.dumps(form.choices),
+            "only": json.dumps(form.constants),
         }
         yield group
     except BaseException:
@@ -193,24 +191,28 @@ def _new_group(model_name, name, form, albedo):
         _unfinished.pop()
 
 
-def _fill(group, model_name, representation, albedo):
+def _group_of(form):
+    return ensure_group(form.model.name, form.name)
+
+
+def _fill(group, form, albedo):
     """Makes the nodes of a form in a group. If it raises CompileError, it has removed its texts."""
-    stem, source = pack.source(model_name, representation)
+    stem, source = form.source()
     sources = {stem: source}
-    if albedo and (of_albedo := pack.albedo_source(model_name, representation)):
+    if albedo and (of_albedo := form.albedo_source()):
         sources |= dict([of_albedo])
     # Lean groups hold only what a render needs.
-    has_twin = "twin" in pack.model(model_name)["representations"]
-    stands_in = representation != "twin" and "baked" not in group[TAG] and has_twin
-    twin_group = ensure_group(model_name, "twin") if stands_in else None
-    if pack.is_native(model_name, representation):
-        group_content.fill_with_nodes(group, model_name, representation, source, twin_group)
+    twin = form.model.forms.get("twin")
+    stands_in = twin is not None and twin != form and "baked" not in group[TAG]
+    twin_group = _group_of(twin) if stands_in else None
+    if form.is_native:
+        group_content.fill_with_nodes(group, form, source, twin_group)
         return
     before = list(group.nodes)
     texts = [stand_in.new_text(f"{stem}.osl", source) for stem, source in sources.items()]
     names = [text.name for text in texts]
     try:
-        group_content.fill_with_scripts(group, model_name, representation, texts, twin_group)
+        group_content.fill_with_scripts(group, form, texts, twin_group)
     except BaseException:
         _remove_others(group, before)
         for name in set(names) & set(bpy.data.texts.keys()):
@@ -235,12 +237,17 @@ def automatic_groups():
     return [g for g in bpy.data.node_groups if g.library is None and AUTO in g.get(TAG, ())]
 
 
-def _is_current(group):
+def _form_of(group):
+    """The current form of a group; None if the installed version lacks it or its model."""
     tag = group[TAG]
-    try:
-        return tag["digest"] == pack.digest(tag["model"], tag["representation"])
-    except ValueError:  # a model or form that the installed version lacks
-        return False
+    if tag["model"] not in pack.model_names():
+        return None
+    return pack.model(tag["model"]).forms.get(tag["representation"])
+
+
+def _is_current(group):
+    form = _form_of(group)
+    return form is not None and group[TAG]["digest"] == form.digest
 
 
 def adapt_to_scene(group, lacks_osl):
@@ -253,7 +260,8 @@ def adapt_to_scene(group, lacks_osl):
         return False
     if not _is_current(group):
         return False
-    wanted = pack.native_form(tag["model"]) if lacks_osl else tag[AUTO]
+    model = pack.model(tag["model"])
+    wanted = model.native_form if lacks_osl else model.forms[tag[AUTO]]
     if wanted is None:
         return False
     _change_form(group, wanted)
@@ -264,20 +272,20 @@ def _change_form(group, form):
     tag, before = group[TAG].to_dict(), list(group.nodes)
     inner = {n.node_tree.session_uid for n in before if is_ours(n)}
     texts = {n.script for n in before if n.bl_idname == "ShaderNodeScript" and n.script}
-    model_name, with_osl = tag["model"], tag[AUTO]
+    with_osl = form.model.forms[tag[AUTO]]
     try:
         if form == with_osl:
-            _fill(group, model_name, form, tag["with_albedo"])
+            _fill(group, form, tag["with_albedo"])
         else:
-            group_content.fill_with_form(group, model_name, form, with_osl, ensure_group)
+            group_content.fill_with_form(group, form, with_osl, _group_of)
     except BaseException:
         _remove_others(group, before)
         group[TAG] = tag
         raise
     for node in before:
         group.nodes.remove(node)
-    group[TAG]["representation"] = form
-    group[TAG]["digest"] = pack.digest(model_name, form)
+    group[TAG]["representation"] = form.name
+    group[TAG]["digest"] = form.digest
     _clear_away(inner, texts)
 
 
@@ -292,17 +300,22 @@ def add_group_node(tree, model_name, representation="auto", values=None):
     node = tree.nodes.new("ShaderNodeGroup")
     node.node_tree = group
     node.width = 200
-    node.label = pack.model(model_name)["label"]
+    node.label = pack.model(model_name).label
     return node
 
 
+class Identity(NamedTuple):
+    """Names of a group node's model and form, which the installed version may lack."""
+
+    model: str
+    form: str
+
+
 def identity(node):
-    """(model, representation) of a group node; of an automatic one the current form, which may
-    depend on its choices."""
+    """The Identity of a group node; of an automatic one with the current form, which may depend on
+    its choices."""
     tag = node.node_tree[TAG]
-    if _lacks_choice(node):
-        return tag["model"], tag[AUTO]
-    return tag["model"], tag["representation"]
+    return Identity(tag["model"], tag[AUTO] if _lacks_choice(node) else tag["representation"])
 
 
 def is_automatic(node):
@@ -316,8 +329,8 @@ def _lacks_choice(node):
     tag = node.node_tree[TAG]
     if tag.get(AUTO, tag["representation"]) == tag["representation"]:
         return False
-    only = pack.canonical(json.loads(tag["native_only"]))
-    return any(not pack.equal_in_float32(get_value(node, n), value) for n, value in only.items())
+    only = canonical(json.loads(tag["native_only"]))
+    return any(not equal_in_float32(get_value(node, n), value) for n, value in only.items())
 
 
 def runs_anywhere(node):
@@ -357,18 +370,26 @@ def is_newer(node):
     return pack.version(made_by(node)) > pack.version(pack.manifest()["generator"])
 
 
+class Entry(NamedTuple):
+    """What the manifest says of a group node."""
+
+    form: dict
+    #: By name.
+    parameters: dict
+
+
 def manifest_entry(node):
-    """The manifest's entry of a node's form, and the parameters by name; None if another version of
-    the extension made the group."""
-    model_name, representation = identity(node)
+    """The Entry of a group node; None if another version of the extension made the group."""
     tag = node.node_tree[TAG]
     if is_baked(node):
         entry = json.loads(tag["baked"])
         same = entry["of"] == pack.manifest()["hash"]
-        return (entry["form"], entry["parameters"]) if same else None
+        return Entry(entry["form"], entry["parameters"]) if same else None
     if not _is_current(node.node_tree):
         return None
-    return pack.representation(model_name, representation), pack.parameters(model_name)
+    model_name, form = identity(node)
+    model = pack.model(model_name)
+    return Entry(model.forms[form].entry, model.parameters)
 
 
 def sockets(node):
@@ -388,7 +409,7 @@ def _choices(node, name):
 def _only(node):
     """Parameters for which the form has a single value; groups of older versions do not list
     them."""
-    return pack.canonical(json.loads(node.node_tree[TAG].get("only", "{}")))
+    return canonical(json.loads(node.node_tree[TAG].get("only", "{}")))
 
 
 def set_value(node, name, value):
@@ -574,7 +595,7 @@ def switch(node, representation):
     model_name, _ = identity(node)
     values = constants(node)
     if representation != "auto":
-        pack.resolve(model_name, representation, values)
+        pack.model(model_name).resolve(representation, values)
     group = ensure_group(model_name, representation, albedo=uses_albedo(node), values=values)
     _exchange(node, group)
 
@@ -615,15 +636,16 @@ def add_albedo(node):
             say("{node} is of another version of the extension: update it first", node=name)
         )
     tag = node.node_tree[TAG]
-    if not group_content.has_albedo(tag["model"]):
+    model = pack.model(tag["model"])
+    if not model.has_albedo:
         raise ValueError(
             say(
                 "{model} has no Albedo output: no table can hold its albedo",
-                model=pack.model(tag["model"])["label"],
+                model=model.label,
             )
         )
     if is_automatic(node):
-        _exchange(node, _ensure_automatic(tag["model"], tag[AUTO], albedo=True))
+        _exchange(node, _ensure_automatic(model.forms[tag[AUTO]], albedo=True))
         return
     _exchange(node, ensure_group(*identity(node), albedo=True))
 

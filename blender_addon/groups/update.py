@@ -75,9 +75,10 @@ def refusal(material, node):
         )
     if model_name not in pack.model_names():
         return say("this version has no model {model!r}", model=model_name)
-    known = pack.parameters(model_name)
+    model = pack.model(model_name)
+    known = model.parameters
     for name, value in nodes.all_values(node).items():
-        if name in pack.fixed(model_name) or name in VECTORS:
+        if name in model.fixed or name in VECTORS:
             continue
         if name not in known:
             return say(
@@ -116,7 +117,7 @@ def update():
                 said = say(
                     "{before} is now {after}",
                     before=form_name(form),
-                    after=form_name(nodes.identity(node)[1]),
+                    after=form_name(nodes.identity(node).form),
                 )
                 notes.append(say("{node}: {what}", node=what, what=said))
         except (ValueError, RuntimeError) as error:  # CompileError and PackError are RuntimeErrors

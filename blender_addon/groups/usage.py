@@ -8,6 +8,7 @@ import numpy as np
 
 from ..common.i18n import form_name, say
 from ..packs import pack
+from ..packs.parameter_values import value_text
 from . import nodes
 
 VARIES = {"varies": True}
@@ -37,9 +38,9 @@ def _as_typed(value):
 
 def _use(material, node):
     model_name, representation = nodes.identity(node)
-    varying = nodes.varying(node)
-    parameters = dict(pack.fixed(model_name))
-    for name in pack.parameters(model_name):
+    model, varying = pack.model(model_name), nodes.varying(node)
+    parameters = dict(model.fixed)
+    for name in model.parameters:
         value = None if name in varying else nodes.get_value(node, name)
         parameters[name] = VARIES if value is None else _as_typed(value)
     asked = "auto" if nodes.is_automatic(node) else representation
@@ -80,7 +81,7 @@ def uses():
 def _shown(value):
     if value == VARIES:
         return say("linked or animated")
-    return pack.value_text(tuple(value) if isinstance(value, list) else value)
+    return value_text(tuple(value) if isinstance(value, list) else value)
 
 
 def _change(before, after):

@@ -99,7 +99,7 @@ def entries():
     for name in pack.model_names():
         if name not in used:
             model = pack.model(name)
-            found.append(Entry(model["label"], _REST, name, {}, (), model["doc"].rstrip(".")))
+            found.append(Entry(model.label, _REST, name, {}, (), model.doc.rstrip(".")))
     return found
 
 
@@ -114,13 +114,13 @@ def make(api, entry):
 def description(entry):
     """The material's description in the Asset Browser: its sentence and the model's paper."""
     model = pack.model(entry.model)
-    return f"{entry.description}. {model['label']}: {model['paper']}"
+    return f"{entry.description}. {model.label}: {model.paper}"
 
 
 def tags(entry):
     """Search words of a material in the Asset Browser, besides its name."""
     model = pack.model(entry.model)
-    return tuple(dict.fromkeys([*entry.tags, model["look"], model["label"], pack.citation(model)]))
+    return tuple(dict.fromkeys([*entry.tags, model.look, model.label, model.citation]))
 
 
 def catalog_id(catalog):

@@ -257,7 +257,7 @@ def _check(folder, blend, model, representation):
             say("Expected one of the models {models}, got {got!r}", models=known, got=model)
         )
     if model in names:
-        pack.resolve(model, representation)
+        pack.model(model).resolve(representation)
 
 
 def _check_replaced(blend):

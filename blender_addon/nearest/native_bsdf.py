@@ -6,6 +6,7 @@ wo to the viewer. The formulas are those of Cycles 4.5 to 5.2 (kernel/closure/bs
 bsdf_oren_nayar.h); tests/blender/test_convert.py compares them with its renders.
 """
 
+import functools
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -199,8 +200,10 @@ def facet_albedo(wo, alpha, beckmann, reflectance=None):
     return (weight.reshape(*weight.shape, *[1] * (color.ndim - 2)) * color).mean(1)
 
 
+@functools.lru_cache(maxsize=64)
 def mean_facet_albedo(alpha):
-    """The cosine-weighted mean of the GGX facet_albedo() over all views."""
+    """The cosine-weighted mean of the GGX facet_albedo() over all views. Cached, as every width
+    that a candidate is tried with asks for it."""
     views = np.stack([np.sqrt(1 - _MU**2), np.zeros(len(_MU)), _MU], -1)
     return (facet_albedo(views, alpha, False) * _SHARE).sum()
 

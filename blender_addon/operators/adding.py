@@ -14,10 +14,10 @@ from .common import ERRORS, keeps_changes, refused, report_osl
 
 def _doc(properties):
     try:
-        entry = pack.model(properties.model)
+        model = pack.model(properties.model)
     except ERRORS:
         return ""
-    return f"{entry['doc']}\n{entry['paper']}"
+    return f"{model.doc}\n{model.paper}"
 
 
 class _ModelOperator:

@@ -156,11 +156,11 @@ def _fits_as_items(_operator, _context):
             iface(
                 say(
                     "{model}: {percent} % of the light in other directions",
-                    model=pack.model(fit.model)["label"],
+                    model=pack.model(fit.model).label,
                     percent=in_percent(fit.error),
                 )
             ),
-            pack.model(fit.model)["doc"],
+            pack.model(fit.model).doc,
         )
         for fit in fits[:OFFERED]
     ]
@@ -175,7 +175,7 @@ def _sum_as_item(found):
         count=len(found.lobes),
         percent=in_percent(found.error),
     )
-    names = " + ".join(pack.model(lobe.model)["label"] for lobe in found.lobes)
+    names = " + ".join(pack.model(lobe.model).label for lobe in found.lobes)
     return (SUM, iface(said), names)
 
 
@@ -213,7 +213,7 @@ class BRDFC_OT_choose_measured(Operator):
             parts = (
                 say(
                     "{model}: {percent} %",
-                    model=pack.model(lobe.model)["label"],
+                    model=pack.model(lobe.model).label,
                     percent=in_percent(lobe.share),
                 )
                 for lobe in self.found.lobe_sum().lobes

@@ -97,7 +97,7 @@ class BRDFC_OT_details(OfActiveMaterial, Operator):
         except ERRORS as error:
             said, more = of_error(error)
             return [said, more] if more else [said]
-        return ui.details(node, made[0]) if made else [say("Made by another version")]
+        return ui.details(node, made.form) if made else [say("Made by another version")]
 
 
 class BRDFC_OT_more(Operator):
@@ -180,7 +180,7 @@ class BRDFC_OT_kernel(ChangesActiveMaterial, Operator):
         return {"FINISHED"}
 
     def _group(self, material):
-        ours = [n for n in nodes.group_nodes(material) if nodes.identity(n)[0] == kernel.MODEL]
+        ours = [n for n in nodes.group_nodes(material) if nodes.identity(n).model == kernel.MODEL]
         wanted = [n for n in ours if nodes.key(n) == self.node] if self.node else ours
         active = [n for n in wanted if n == n.id_data.nodes.active]
         if not wanted or (len(wanted) > 1 and not active):

@@ -51,7 +51,7 @@ def _combination(table, schema, values):
 
 def views(model_name):
     """View cosines of the tables; a pack that is cut to a scene has only those that it needs."""
-    return tuple(pack.model(model_name).get("view_cosines", (0, 1)))
+    return tuple(pack.model(model_name).entry.get("view_cosines", (0, 1)))
 
 
 def albedo(model_name, values, cos_theta_o):
@@ -61,7 +61,8 @@ def albedo(model_name, values, cos_theta_o):
     default. Raises ValueError for an unknown model, for one without a table, and for a view that
     was cut from the table.
     """
-    table, schema = pack.model(model_name).get("albedo"), pack.parameters(model_name)
+    model = pack.model(model_name)
+    table, schema = model.entry.get("albedo"), model.parameters
     if table is None:
         raise ValueError(f"{model_name}: its albedo is not tabulated")
     low, high = views(model_name)

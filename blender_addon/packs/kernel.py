@@ -27,7 +27,7 @@ def heights(curve):
     mapping.initialize()  # a new curve can't be evaluated before this
     places = [i / (len(_HEIGHTS) - 1) for i in range(len(_HEIGHTS))]
     found = [mapping.evaluate(mapping.curves[0], x) for x in places]
-    lowest = pack.parameters(MODEL).get("h0", {"min": 0})["min"]
+    lowest = pack.model(MODEL).parameters.get("h0", {"min": 0})["min"]
     for x, height in zip(places, found, strict=True):
         where = {"curve": curve.name, "x": f"{x:.3g}"}
         if not height > 0:

@@ -27,7 +27,7 @@ _INSIDE = ("attenuation", "per_length")
 
 def can_have(model_name):
     """Whether a model has parameters that describe its material."""
-    return any("optical" in p for p in pack.parameters(model_name).values())
+    return any("optical" in p for p in pack.model(model_name).parameters.values())
 
 
 def find(name):
@@ -48,7 +48,7 @@ def find(name):
         raise ValueError(f"{name}: {error.strerror}") from error
 
 
-def _absorption(model_name, substance, metres):
+def _absorption(model, substance, metres):
     """Values by role. Raises ValueError if nothing is absorbed, so that a thickness means
     nothing."""
     from ..brdfc import optics
@@ -65,13 +65,13 @@ def _absorption(model_name, substance, metres):
                     thickness=f"{metres:g}",
                 )
             )
-        roles = {p.get("optical") for p in pack.parameters(model_name).values()}
-        roles |= set(pack.fixed_optical(model_name).values())
+        roles = {p.get("optical") for p in model.parameters.values()}
+        roles |= set(model.fixed_optical.values())
         if not absorbs or "attenuation" not in roles:
             raise ValueError(
                 say(
                     "A thickness says where absorption is exact: {name} absorbs nothing",
-                    name=substance.label if not absorbs else model_name,
+                    name=substance.label if not absorbs else model.name,
                 )
             )
     if not absorbs:
@@ -99,13 +99,13 @@ def _value(role, kind, substance, values, of_inside):
 _SAME = {"rel_tol": 2e-3, "abs_tol": 2e-4}
 
 
-def _check_fixed(model_name, substance, value_of):
+def _check_fixed(model, substance, value_of):
     """Raises ValueError if a pack that is cut to a scene has fixed parameters, without sockets, of
     another substance. `value_of`: takes role and kind."""
-    fixed = pack.fixed(model_name)
     other = []
-    for name, role in pack.fixed_optical(model_name).items():
-        here = fixed[name] if isinstance(fixed[name], tuple) else (fixed[name],)
+    for name, role in model.fixed_optical.items():
+        here = model.fixed[name]
+        here = here if isinstance(here, tuple) else (here,)
         value = value_of(role, "number" if len(here) == 1 else "color")
         value = value if value is None or isinstance(value, tuple) else (value,)
         if value is not None and not all(
@@ -118,7 +118,7 @@ def _check_fixed(model_name, substance, value_of):
                 "This extension was built for one scene: {names} of {model} can't be those of "
                 "{substance}; build it again, or take the whole extension",
                 names=", ".join(other),
-                model=pack.model(model_name)["label"],
+                model=model.label,
                 substance=substance.label,
             )
         )
@@ -128,15 +128,15 @@ def parameters(model_name, substance, thickness=None):
     """The values of those parameters by name. `thickness`: metres at which absorption is exact.
     Raises ValueError if the model has no parameters for such a substance, if a thickness is given
     but nothing is absorbed, and if this pack has fixed other values."""
-    values = substance.values(color.from_xyz)
-    of_inside = _absorption(model_name, substance, thickness)
+    model, values = pack.model(model_name), substance.values(color.from_xyz)
+    of_inside = _absorption(model, substance, thickness)
 
     def value_of(role, kind):
         return _value(role, kind, substance, values, of_inside)
 
-    _check_fixed(model_name, substance, value_of)
+    _check_fixed(model, substance, value_of)
     found = {}
-    for name, p in pack.parameters(model_name).items():
+    for name, p in model.parameters.items():
         if "optical" not in p:
             continue
         value = value_of(p["optical"], p["kind"])
@@ -145,7 +145,7 @@ def parameters(model_name, substance, thickness=None):
             found[name] = (
                 min(max(float(value), p["min"]), p["max"]) if single else tuple(map(float, value))
             )
-    if not found and not pack.fixed_optical(model_name):
+    if not found and not model.fixed_optical:
         if substance.conductor:
             text = say(
                 "{model} has no parameter that says which metal it is made of", model=model_name

@@ -23,8 +23,8 @@ _places = {}  # values and form: name of the preview, legend
 def _values(node):
     """A node's values by name, and the names of linked parameters."""
     model_name, _ = nodes.identity(node)
-    values = dict(pack.fixed(model_name))
-    values |= {name: nodes.get_value(node, name) for name in pack.parameters(model_name)}
+    model = pack.model(model_name)
+    values = model.fixed | {name: nodes.get_value(node, name) for name in model.parameters}
     return values, [name for name, value in values.items() if value is None]
 
 
@@ -83,7 +83,7 @@ def _shares(color):
 
 
 def _form_said(node, legend):
-    form = form_name(nodes.identity(node)[1])
+    form = form_name(nodes.identity(node).form)
     if legend.form is not None:
         percent = _percent(legend.form)
         return say(
@@ -146,7 +146,7 @@ def draw_plots(layout, material):
         wrapped(column, say("Below: reflected share, views from 0\u00b0 to 90\u00b0"))
         _, linked = _values(node)
         if linked:
-            labels = pack.parameters(nodes.identity(node)[0])
+            labels = pack.model(nodes.identity(node).model).parameters
             names = ", ".join(labels[name]["label"] for name in linked)
             said = say("At the default of {parameters}", parameters=names)
             wrapped(column, said, "INFO")

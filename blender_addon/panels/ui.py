@@ -10,7 +10,6 @@ from bpy.types import Menu, Panel
 from .. import convert, lamps
 from ..common import color, editable
 from ..common.i18n import form_name, iface, in_percent, of_error, say
-from ..content import group_content
 from ..groups import nodes
 from ..packs import energy, kernel, optical, pack
 from ..trees import shader_trees
@@ -31,8 +30,8 @@ LOOKS = {
 
 def menu_label(name):
     """A model's label with its paper's authors and year, all of which the menu search finds."""
-    entry = pack.model(name)
-    return f"{entry['label']} ({pack.citation(entry)})"
+    model = pack.model(name)
+    return f"{model.label} ({model.citation})"
 
 
 def _draw_models(layout, operator):
@@ -135,7 +134,7 @@ def cost_text(node, form):
     if form["cost"] is None:
         return say("not measured")
     # In a pack cut to a scene, forms have fewer parameters, so their cost differs.
-    cut = nodes.is_baked(node) or pack.fixed(nodes.identity(node)[0])
+    cut = nodes.is_baked(node) or pack.model(nodes.identity(node).model).fixed
     times = f"{form['cost']:.2f}"
     if cut:
         return say("{times} x Glossy, at default parameters", times=times)
@@ -151,7 +150,7 @@ def energy_text(node):
     reason why there is none."""
     model_name, _ = nodes.identity(node)
     values = {}
-    for name, parameter in pack.parameters(model_name).items():
+    for name, parameter in pack.model(model_name).parameters.items():
         value = nodes.get_value(node, name)
         if value is None:
             return say("depends on what is linked to {socket}", socket=parameter["label"])
@@ -181,15 +180,15 @@ def _draw_form(layout, node, form, scene, changes):
             layout,
             say("Lean: only what this file needs. A render method brings the whole model back"),
         )
-    entry = pack.model(model_name)
+    model = pack.model(model_name)
     row = layout.row(align=True)
     row.enabled = changes
-    values = {key: nodes.get_value(node, key) for key in pack.parameters(model_name)}
+    values = {key: nodes.get_value(node, key) for key in model.parameters}
     refusals, automatic = [], nodes.is_automatic(node)
-    if pack.native_form(model_name):
+    if model.native_form:
         _add_method(row, node, "auto", automatic)
-    for name in entry["representations"]:
-        if refusal := pack.reason_unavailable(model_name, name, values):
+    for name, method in model.forms.items():
+        if refusal := method.refusal(values):
             refusals.append(refusal)
             continue
         _add_method(row, node, name, name == representation and not lean and not automatic)
@@ -210,7 +209,7 @@ def _draw_form(layout, node, form, scene, changes):
         emboss=False,
     ).node = nodes.key(node)
     wrapped(column, say("Cost: {cost}", cost=cost_text(node, form)))
-    if entry.get("albedo"):
+    if model.entry.get("albedo"):
         wrapped(column, say("Albedo: {albedo}", albedo=energy_text(node)))
 
 
@@ -230,18 +229,18 @@ def draw_node(layout, node, scene):
     layout.label(text=node.label or node.name, icon="MATERIAL", translate=False)
     changes = editable.keeps_changes(node.id_data)
     if made := nodes.manifest_entry(node):
-        entry = pack.model(model_name)
+        model = pack.model(model_name)
         column = layout.column(align=True)
-        for said in filter(None, (entry["paper"], entry["equations"])):
+        for said in filter(None, (model.paper, model.entry["equations"])):
             wrapped(column, said)
-        _draw_form(layout, node, made[0], scene, changes)
+        _draw_form(layout, node, made.form, scene, changes)
     _draw_values(layout, node)
     layout = layout.column()
     layout.enabled = changes
     if made and optical.can_have(model_name):
         menu = layout.operator_menu_enum("brdfc.substance", "substance", icon="MATERIAL_DATA")
         menu.node = nodes.key(node)
-    may_have = made and not nodes.is_baked(node) and group_content.has_albedo(model_name)
+    may_have = made and not nodes.is_baked(node) and model.has_albedo
     if may_have and nodes.ALBEDO not in node.outputs:
         layout.operator("brdfc.add_albedo", icon="ADD").node = nodes.key(node)
     if model_name == kernel.MODEL:
@@ -250,7 +249,7 @@ def draw_node(layout, node, scene):
 
 def draw_lamps(layout, material, scene):
     """Shows the lamps that the material's models aim at, if any of them does."""
-    forms = [made[0] for n in nodes.group_nodes(material) if (made := nodes.manifest_entry(n))]
+    forms = [made.form for n in nodes.group_nodes(material) if (made := nodes.manifest_entry(n))]
     slots = max((form.get("lamps") or 0 for form in forms), default=0)
     if slots == 0:
         return

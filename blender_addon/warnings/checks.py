@@ -34,10 +34,10 @@ def _by_twin(finding, ours):
 
 def _twin_error(node):
     """Error of a node's twin; None if it is not known at the node's values."""
-    entry, (model_name, _) = twin_of(node), nodes.identity(node)
-    if not entry or pack.reason_unavailable(model_name, "twin", nodes.all_values(node)):
+    twin = twin_of(node)
+    if twin is None or twin.refusal(nodes.all_values(node)):
         return None
-    return entry["error"]["relative_l1"]
+    return twin.entry["error"]["relative_l1"]
 
 
 def scene_warnings(scene):

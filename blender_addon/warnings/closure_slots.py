@@ -100,10 +100,10 @@ def of_material(material):
     slots, slots_per_lamp, trees = 0, 0, 0
     for node in (shown.node for shown in shader_trees.shown(material)):
         if nodes.is_ours(node) and (made := nodes.manifest_entry(node)):
-            aimed_at = made[0].get("lamps") or 0
-            slots += _times(node) * (made[0].get("slots", 0) - aimed_at * a_lamp)
+            aimed_at = made.form.get("lamps") or 0
+            slots += _times(node) * (made.form.get("slots", 0) - aimed_at * a_lamp)
             slots_per_lamp += _times(node) * a_lamp * bool(aimed_at)
-            trees += bool(aimed_at) and nodes.identity(node)[1] == "nodes"
+            trees += bool(aimed_at) and nodes.identity(node).form == "nodes"
         else:
             slots += _times(node) * _native_slots(node)
     return ClosureUsage(slots, slots_per_lamp, trees)

@@ -2,7 +2,7 @@
 """Predicates of warnings about a group node: its shader, its version and its values."""
 
 from ..groups import nodes
-from ..packs import pack
+from ..packs.parameter_values import unused_parameters, value_text
 from .rows import when
 
 
@@ -57,11 +57,11 @@ def out_of_range(at):
 
 def no_effect(at):
     """A value was changed that the model does not read while a choice is as it is."""
-    for name, choice in pack.unused_parameters(at.schema, at.values).items():
+    for name, choice in unused_parameters(at.schema, at.values).items():
         yield {
             "parameter": at.schema[name]["label"],
             "choice": at.schema[choice]["label"],
-            "value": pack.value_text(at.values[choice]),
+            "value": value_text(at.values[choice]),
         }
 
 

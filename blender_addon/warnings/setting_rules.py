@@ -31,7 +31,7 @@ def guiding_spoils(at):
 def guiding_costs(at):
     """Path Guiding is on, and the form is Sampled. Measured: it renders correctly, with the same
     noise, but takes half as long again."""
-    sampled = at.form and nodes.identity(at.node)[1] == "sampled" and not at.stood_in
+    sampled = at.form and nodes.identity(at.node).form == "sampled" and not at.stood_in
     return when(sampled and at.scene.cycles.use_guiding)
 
 
@@ -47,10 +47,12 @@ def _is_clamped_as_new(at):
 
 def clamp_indirect(at):
     """Indirect Light is clamped, and the form receives light by random rays. Formula nodes render
-    their lamps by light sampling: they are warned of only where the scene has other bright light
-    than that of a new one."""
+    their lamps by light sampling: they are warned of only where the scene has brighter light than
+    that of a new one, or of moderate lamps if they have no mirror."""
     clamp = at.scene.cycles.sample_clamp_indirect
-    spared = at.form.get("nodes") and _is_clamped_as_new(at)
+    moderate = clamp >= LOW_CLAMP and at.of_scene.is_lit_moderately
+    harmless = _is_clamped_as_new(at) or (moderate and "clamp_mirror" not in at.declared)
+    spared = at.form.get("nodes") and harmless
     return when(clamp > 0 and not spared, clamp=f"{clamp:g}")
 
 

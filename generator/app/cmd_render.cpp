@@ -85,7 +85,8 @@ void add_render_command(Command app) {
   auto options = std::make_shared<Options>();
   const Command command = app.add_subcommand("render", "Render the reference picture of a scene");
   command.add_option("SCENE", options->scene, "Scene file (.json)").required();
-  command.add_option("--out", options->out, "EXR to write, with a variance layer").required();
+  command.add_option("--out", options->out, "EXR to write, with a variance layer; folders that are missing are made")
+      .required();
   add_number(command, "--spp", options->spp, {1, 10000000}, "Samples per pixel (default: the scene's)");
   add_number(command, "--seed", options->seed, {0, 2147483647}, "Seed of the random numbers (default: the scene's)");
   add_number(command, "--threads", options->threads, {1, 1024},

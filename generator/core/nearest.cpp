@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/nearest.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 namespace brdfc::inline core {
 namespace {
+
+/// Fewest letters of a word that is looked for inside of other words.
+constexpr std::size_t kLeastPart = 4;
 
 /// The Damerau-Levenshtein distance in its restricted form: no letter is edited more than once.
 std::size_t edits(const std::string& a, const std::string& b) {
@@ -25,15 +30,23 @@ std::size_t edits(const std::string& a, const std::string& b) {
 }  // namespace
 
 std::string did_you_mean(const std::string& word, const std::vector<std::string>& known) {
-  std::string nearest;
-  std::size_t fewest = std::max<std::size_t>(1, word.size() / 3) + 1;
+  std::vector<std::string> nearest;
+  std::size_t fewest = std::max<std::size_t>(1, word.size() / 3);
   for (const std::string& k : known) {
     // The difference in length is a lower bound of the distance. This test is cheap even if the word is as long as a
     // file.
-    if (std::max(word.size(), k.size()) - std::min(word.size(), k.size()) >= fewest) continue;
-    if (const std::size_t n = edits(word, k); n < fewest) fewest = n, nearest = k;
+    if (std::max(word.size(), k.size()) - std::min(word.size(), k.size()) > fewest) continue;
+    const std::size_t n = edits(word, k);
+    if (n < fewest) nearest.clear();
+    if (n <= fewest) fewest = n, nearest.push_back(k);
   }
-  return nearest.empty() ? "" : "did you mean " + nearest + "? ";
+  if (word.size() >= kLeastPart)
+    for (const std::string& k : known)
+      if (k.find(word) != std::string::npos && std::ranges::find(nearest, k) == nearest.end()) nearest.push_back(k);
+  if (nearest.empty()) return "";
+  const std::string last = nearest.back();
+  nearest.pop_back();
+  return fmt::format("did you mean {}{}{}? ", fmt::join(nearest, ", "), nearest.empty() ? "" : " or ", last);
 }
 
 }  // namespace brdfc::inline core

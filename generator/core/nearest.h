@@ -7,8 +7,9 @@
 
 namespace brdfc::inline core {
 
-/// "did you mean ward? ", with the known word at the smallest edit distance from `word`. Edits insert, remove or change
-/// a letter, or swap two neighbouring letters. Returns "" if more than a third of the letters would have to be edited.
+/// "did you mean ward? ", with the known words at the smallest edit distance from `word`, and those that contain it.
+/// Edits insert, remove or change a letter, or swap two neighbouring letters. Returns "" if there is no such word: if
+/// more than a third of the letters would have to be edited.
 std::string did_you_mean(const std::string& word, const std::vector<std::string>& known);
 
 }  // namespace brdfc::inline core

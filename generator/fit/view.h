@@ -15,6 +15,7 @@
 
 #include "closures/closure.h"
 #include "measure/bound_model.h"
+#include "model/mirror_side.h"
 
 namespace brdfc::fit {
 
@@ -26,14 +27,6 @@ struct Points {
 
 /// The weights as a column.
 Eigen::VectorXd weights_of(const Points&);
-
-/// The direction along the surface towards the mirror side; at normal incidence any such direction.
-template <class T> Vec3<T> mirror_side(const Vec3<T>& wo) {
-  const T sinTheta = sqrt(sin2_theta(wo));
-  const auto oblique = sinTheta > T(1e-6);
-  const T scale = T(-1) / select(oblique, sinTheta, T(1));
-  return {select(oblique, wo.x * scale, T(1)), select(oblique, wo.y * scale, T(0)), T(0)};
-}
 
 /// The direction in the plane of incidence that is `angle` from the mirror direction, in the sense towards the normal
 /// and past it.

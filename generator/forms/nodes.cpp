@@ -90,6 +90,7 @@ ClosureSum<Expr> record_base(const Model& model, const ParamValues& fixed, const
       if (is_stretched)
         output("anisotropy",
                select(c.alpha < c.alpha_across, Expr(1) - c.alpha / mean, c.alpha_across / mean - Expr(1)));
+      if (c.stretched == Tangent::View) closure["along"] = "view";
     }
     if (has_cone(c.kind)) {
       output("size", c.size);

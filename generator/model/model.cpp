@@ -23,7 +23,7 @@ const Model& find_model(const std::string& name) {
   if (it != models().end()) return *it->second;
   std::vector<std::string> names;
   for (const auto& [n, model] : models()) names.push_back(n);
-  input_error("unknown model '{}': {}expected one of {}", name, did_you_mean(name, names), fmt::join(names, ", "));
+  input_error("unknown model '{}': {}`brdfc list` prints all models", name, did_you_mean(name, names));
 }
 
 std::vector<const Model*> models_named(const std::string& name) {

@@ -5,13 +5,14 @@
 // A model declares them as under(wo), and registers that with BRDFC_UNDER after BRDFC_MODEL. For any parameters and
 // directions their sum is at most f cos(theta_i), but for 2e-4 of the model's light; weights are not negative. They are
 // of kinds that Blender has a node for: Diffuse, OrenNayar with the weight 1, DiffuseToon, Ggx and Beckmann, all about
-// the surface's normal and, if anisotropic, the x axis. For all choices they are the same; a choice may have the weight
-// 0.
+// the surface's normal. Anisotropic facets are stretched along the x axis or the view. For all choices the kinds are
+// the same; a choice may have the weight 0.
 #pragma once
 
 #include <array>
 
 #include "model/base_terms.h"
+#include "model/mirror_side.h"
 #include "model/model.h"
 
 namespace brdfc::inline model {
@@ -63,6 +64,27 @@ template <class T> T narrow_towards_horizon(const T& a, const Vec3<T>& wo) {
   const T x2 = sqr(a / wo.z);
   return T(4.2) * x2 / (T(1) + T(2) * x2);
 }
+
+/// Microfacets with Beckmann's distribution below cos^e alpha about the mirror direction, for e >= 1.
+///
+/// Let s be a slope of the half vector and c the cosine of the view. In the plane of incidence alpha is 2 theta_h, so
+/// cos^e alpha is ((1 - s^2) / (1 + s^2))^e = exp(-2 e s^2 - ...), and the facets have (1 + s^2)^2 exp(-s^2 / a^2),
+/// which is less for a^2 = 1 / (2 e + 2). Across the plane cos alpha is 1 - 2 c^2 s^2 / (1 + s^2), so the slopes there
+/// are larger: 1 / (2 e c^2 + 2). At the mirror direction both are equal with the weight sqrt((e + 1) c^2 / (e c^2 +
+/// 1)). Masking takes light towards the horizon. Where the power is small, the facets exceed it by less than 2e-4 of
+/// its light.
+template <class T> Closure<T> power_facets_under(const Rgb<T>& weight, const T& e, const Vec3<T>& wo) {
+  const T more = T(1) + T(2.5) / (e + T(1)), c2 = sqr(wo.z);  // 1 does for large e
+  const T x = T(1) / (e + more), y = T(1) / (e * c2 + more);
+  Closure<T> c(ClosureKind::Beckmann, weight * (wo.z * (e + T(1)) * sqrt(x * y)));
+  c.alpha = facet_alpha(sqrt(x / T(2)));
+  c.alpha_across = facet_alpha(sqrt(y / T(2)));
+  c.tangent = mirror_side(wo);
+  c.stretched = Tangent::View;
+  return c;
+}
+/// The part of cos^e alpha that power_facets_under() takes, on average over views.
+inline constexpr double kPowerUnder = 0.9;
 
 namespace detail {
 

@@ -15,6 +15,7 @@
 #include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/sampling.h"
+#include "model/under.h"
 
 namespace brdfc {
 
@@ -74,8 +75,10 @@ template <class T> struct GlossyReflector {
   ClosureSum<T> base(const Vec3<T>&) const {
     return power_cones(cr * (kr * share_of_wide(e) * (e + T(1)) / (T(2) * pi<T>())), e);
   }
+  ClosureSum<T> under(const Vec3<T>& wo) const { return {power_facets_under(cr * kr, e, wo)}; }
 };
 
 BRDFC_MODEL(GlossyReflector)
+BRDFC_UNDER(GlossyReflector)
 
 }  // namespace brdfc

@@ -65,16 +65,17 @@ template <class T> struct PhongMaterial {
     return select(above(wi, wo), f, Rgb<T>(T(0)));
   }
 
-  /// The probabilities of the lobes, in proportion to the largest albedo of each; that of the diffuse term is `matte`.
+  /// The probabilities of the lobes, in proportion to the largest albedo of each; that of the diffuse term is `matte`,
+  /// and of the reflection the part `reflected` is counted.
   struct Shares {
     T specular, reflection;
   };
-  Shares shares(const T& matte) const {
-    const T s = ks * max_component(cs) * (T(2) * pi<T>() / (es + T(1))), r = kr * max_component(cr);
+  Shares shares(const T& matte, const T& reflected) const {
+    const T s = ks * max_component(cs) * (T(2) * pi<T>() / (es + T(1))), r = kr * max_component(cr) * reflected;
     const T all = maximum(matte + s + r, tiny<T>());
     return {named("specular_share", s / all), named("reflection_share", r / all)};
   }
-  Shares shares() const { return shares(kd * max_component(cd)); }
+  Shares shares() const { return shares(kd * max_component(cd), T(1)); }
 
   T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const { return pdf(wi, wo, shares()); }
   T pdf(const Vec3<T>& wi, const Vec3<T>& wo, const Shares& p) const {
@@ -102,11 +103,13 @@ template <class T> struct PhongMaterial {
             power_closure(cr * (kr * (e + T(1)) / ((e + T(2)) * lobe_height(wo.z, T(0.25) / (e + T(2))))), e)};
   }
 
-  /// The diffuse term, exactly.
-  ClosureSum<T> under(const Vec3<T>&) const { return {Closure<T>(ClosureKind::Diffuse, cd * kd)}; }
-  /// Where that is taken, the highlight and the reflection alone are drawn.
+  /// The diffuse term, exactly, and a part of the reflection.
+  ClosureSum<T> under(const Vec3<T>& wo) const {
+    return {Closure<T>(ClosureKind::Diffuse, cd * kd), power_facets_under(cr * kr, e, wo)};
+  }
+  /// Where these are taken, the highlight and what is left of the reflection are drawn.
   Sample<T> sample_beside_under(const Vec3<T>& wo, const Vec3<T>& u, const T& stands) const {
-    return sample(wo, u, shares(kd * max_component(cd) * (T(1) - stands)));
+    return sample(wo, u, shares(kd * max_component(cd) * (T(1) - stands), T(1 - kPowerUnder)));
   }
 };
 

@@ -24,10 +24,11 @@ class ObjectReader {
     Object object;
     object.name = j.at("name").text();
     json resolved{{"name", object.name}};
-    const Shape& shape = read_shape(j.at("shape"));
+    double size = 1;
+    const Shape& shape = read_shape(j.at("shape"), size);
     object.mesh = shape.mesh;
     resolved["shape"] = shape.resolved;
-    object.transform = read_transform(j.find("transform"), resolved["transform"]);
+    object.transform = read_transform(j.find("transform"), size, resolved["transform"]);
     const JsonView material = j.at("material");
     const std::string id = material.text();
     const auto& list = scene_.materials;
@@ -55,16 +56,25 @@ class ObjectReader {
     json resolved;
   };
 
-  /// Shapes with the same JSON text are read or made once.
-  const Shape& read_shape(const JsonView& j) {
-    const std::string text = json_text(j.json());
+  /// Shapes with the same JSON text are read or made once. Many spheres that differ in their radius share a unit
+  /// sphere, which the transform has to scale by `size`.
+  const Shape& read_shape(const JsonView& j, double& size) {
+    std::string text = json_text(j.json());
     if (const auto known = shapes_.find(text); known != shapes_.end()) return known->second;
     std::vector<std::string> types = shape_types();
     types.push_back("mesh");
     const std::string type = j.at("type").choice(types);
     Mesh mesh;
-    if (type != "mesh") {
+    if (type == "sphere" && triangles_of_spheres_ > kMostCopies) {
+      size = read_radius(j);
+      json unit = j.json();
+      unit["radius"] = 1;
+      text = json_text(unit);
+      if (const auto known = shapes_.find(text); known != shapes_.end()) return known->second;
+      mesh = read_unit_sphere(j);
+    } else if (type != "mesh") {
       mesh = read_shape_of_numbers(j, type);
+      if (type == "sphere") triangles_of_spheres_ += mesh.triangles.size();
     } else if (j.has("file")) {
       j.only({"type", "file", "smooth", "of_material"});
       const auto smooth = j.find("smooth"), of_material = j.find("of_material");
@@ -103,7 +113,8 @@ class ObjectReader {
   }
 
   /// The order is scale, rotation about x, about y, about z (Blender's "XYZ"), translation.
-  static Transform read_transform(const std::optional<JsonView>& j, json& resolved) {
+  /// `size` is a further factor of the scale.
+  static Transform read_transform(const std::optional<JsonView>& j, double size, json& resolved) {
     std::array<double, 3> translate{0, 0, 0}, rotate{0, 0, 0}, scale{1, 1, 1};
     if (j) {
       j->only({"translate", "rotate_degrees", "scale"});
@@ -116,6 +127,7 @@ class ObjectReader {
           scale = v->numbers<3>(kSmall, kFar);
       }
     }
+    for (double& s : scale) s *= size;
     resolved = {{"translate", translate}, {"rotate_degrees", rotate}, {"scale", scale}};
     Transform t;
     t.translation = vector_of(translate);
@@ -137,7 +149,8 @@ class ObjectReader {
 
   SceneFiles& files_;
   Scene& scene_;
-  std::map<std::string, Shape> shapes_;  // by their JSON text
+  std::map<std::string, Shape> shapes_;   // by their JSON text
+  std::size_t triangles_of_spheres_ = 0;  // of those that have a mesh of their own
 };
 
 }  // namespace

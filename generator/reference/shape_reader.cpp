@@ -29,12 +29,14 @@ bool boolean_or(const JsonView& j, const char* key, bool otherwise) {
   return v ? v->boolean() : otherwise;
 }
 
-Mesh read_sphere(const JsonView& j) {
+Mesh read_sphere_of_radius(const JsonView& j, double radius) {
   j.only({"type", "radius", "segments", "rings", "smooth"});
   const int segments = integer_or(j, "segments", 256, 3, 8192);
-  return make_sphere(number_or(j, "radius", 1), segments, integer_or(j, "rings", std::max(2, segments / 2), 2, 4096),
+  return make_sphere(radius, segments, integer_or(j, "rings", std::max(2, segments / 2), 2, 4096),
                      boolean_or(j, "smooth", true));
 }
+
+Mesh read_sphere(const JsonView& j) { return read_sphere_of_radius(j, read_radius(j)); }
 
 Mesh read_quad(const JsonView& j) {
   j.only({"type", "size"});
@@ -96,5 +98,9 @@ Mesh read_shape_of_numbers(const JsonView& j, const std::string& type) {
   return std::find_if(std::begin(kReaders), std::end(kReaders), [&](const Reader& r) { return r.type == type; })
       ->read(j);
 }
+
+double read_radius(const JsonView& j) { return number_or(j, "radius", 1); }
+
+Mesh read_unit_sphere(const JsonView& j) { return read_sphere_of_radius(j, 1); }
 
 }  // namespace brdfc::reference

@@ -20,4 +20,9 @@ std::vector<std::string> shape_types();
 /// and key.
 Mesh read_shape_of_numbers(const JsonView& j, const std::string& type);
 
+/// The radius of a sphere.
+double read_radius(const JsonView& j);
+/// The sphere with a radius of 1 in place of its own.
+Mesh read_unit_sphere(const JsonView& j);
+
 }  // namespace brdfc::reference

@@ -116,6 +116,7 @@ def extension(extension_zip):
         "packs.device",
         "packs.energy",
         "packs.pack",
+        "packs.parameter_values",
         "panels.ui",
         "warnings.checks",
         "warnings.scene_rules",

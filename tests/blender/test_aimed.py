@@ -71,7 +71,7 @@ def cases_of(extension, rng, form, few_of):
 
 def other_choices(extension, name, form):
     """All combinations of a form's choices except the first, which has the defaults."""
-    options = extension.pack.form_choices(name, form)
+    options = extension.pack.model(name).forms[form].choices
     combinations = itertools.product(*options.values())
     return [dict(zip(options, chosen, strict=True)) for chosen in combinations][1:]
 

@@ -91,7 +91,7 @@ def test_forms_use_only_closures_that_conform(rows, extension):
     called = set()
     for model, entry in extension.api.models().items():
         for form in entry["representations"]:
-            _, source = extension.pack.source(model, form)
+            _, source = extension.pack.model(model).forms[form].source()
             for key in calls(source):
                 if key[0] in {f for f, *_ in sound} or key[0].endswith("_bsdf"):
                     called.add((model, form, key))

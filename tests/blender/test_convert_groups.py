@@ -142,7 +142,7 @@ def test_every_form_works_in_a_group(extension, convert, empty, kind, color, val
     for material in (inside, outside):
         extension.api.switch_representation(material, form)
         (node,) = extension.nodes.group_nodes(material)
-        assert extension.nodes.identity(node)[1] == form
+        assert extension.nodes.identity(node).form == form
     seen = [np.array(flat(empty, m)) for m in (inside, outside)]
     print(seen)
     assert seen[0] == pytest.approx(seen[1], rel=2e-3)
@@ -238,8 +238,8 @@ def test_buttons_find_the_nodes_of_groups(extension, convert, empty):
     extension.ui.draw_material(layout, material, empty)
     assert extension.nodes.key(inside) == "Paint/Group" and extension.nodes.key(outside) == "Group"
     assert bpy.ops.brdfc.switch(node="Paint/Group", representation="sampled") == {"FINISHED"}
-    assert extension.nodes.identity(inside)[1] == "sampled"
-    assert extension.nodes.identity(outside)[1] != "sampled"
+    assert extension.nodes.identity(inside).form == "sampled"
+    assert extension.nodes.identity(outside).form != "sampled"
 
 
 def test_panel_lamps_and_lists_know_the_models_of_groups(extension, convert, empty):

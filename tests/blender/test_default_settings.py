@@ -41,7 +41,7 @@ def few_samples(scene, samples, size=16):
 
 def form_of(extension, material):
     (node,) = extension.nodes.group_nodes(material)
-    return extension.nodes.identity(node)[1]
+    return extension.nodes.identity(node).form
 
 
 def update(scene):
@@ -51,7 +51,8 @@ def update(scene):
 
 
 def native(extension, model):
-    return extension.pack.native_form(model)
+    form = extension.pack.model(model).native_form
+    return form and form.name
 
 
 def gallery(scene, materials):
@@ -160,6 +161,30 @@ def moving_material(extension, model="lambertian_specular"):
     driver = color.outputs[0].driver_add("default_value", 2).driver
     driver.type, driver.expression = "SCRIPTED", "0.3 + frame / 50"
     return material
+
+
+@pytest.mark.parametrize(
+    ("kind", "watts", "warned"),
+    [("SUN", 1, False), ("SPOT", 1000, False), ("AREA", 10, False), ("AREA", 1000, True)],
+)
+def test_a_clamp_that_takes_no_light_is_no_finding(extension, new_file, kind, watts, warned):
+    """Blender clamps indirect light at 10 in a new file. Of formula nodes without a mirror that
+    takes light under bright area lamps alone; mirrors show clamped lamps in other surfaces."""
+    data = bpy.data.lights["Light"]
+    data.type, data.energy = kind, watts
+    if kind == "AREA":
+        bpy.data.objects["Light"].data.size = 1.0
+
+    def codes(model):
+        material = extension.api.new_material(model)
+        assert form_of(extension, material) == "nodes"
+        update(new_file)
+        return {w.code for w in extension.api.warnings(material, new_file)}
+
+    assert ("clamp_indirect" in codes("cook_torrance")) == warned
+    assert "clamp_mirror" in codes("coupled")
+    bpy.data.objects.remove(bpy.data.objects["Light"])
+    assert "clamp_indirect" not in codes("oren_nayar"), "without a lamp"
 
 
 def test_a_material_follows_the_scene(extension, new_file):
@@ -346,6 +371,8 @@ def test_convert(extension, new_file):
     for osl in (False, True):
         new_file.cycles.shading_system = osl
         update(new_file)
-        wanted = "nodes" if not osl else extension.pack.automatic(plan.model, plan.values)
+        wanted = (
+            "nodes" if not osl else extension.pack.model(plan.model).automatic(plan.values).name
+        )
         assert form_of(extension, material) == wanted
         assert extension.api.warnings(material, new_file) == []

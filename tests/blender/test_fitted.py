@@ -153,7 +153,7 @@ def along_sliders(extension):
         if "fitted" not in entry["representations"]:
             continue
         axis = entry["representations"]["fitted"]["axis"]
-        only = extension.pack.form_values(model, "fitted")
+        only = extension.pack.model(model).forms["fitted"].only
         free = [p for p in entry["parameters"] if p["name"] not in {*only, axis["name"]}]
         for share, colour in SHARES.items():
             span = (axis["max"] + 1) / (axis["min"] + 1)
@@ -213,7 +213,7 @@ def test_forms_of_the_extension_along_their_sliders(extension, tool):
 def test_a_number_beyond_its_slider_is_warned_of(extension, empty):
     material = extension.api.new_material("blinn", "fitted")
     (node,) = extension.nodes.group_nodes(material)
-    end = extension.pack.representation("blinn", "fitted")["axis"]["max"]
+    end = extension.pack.model("blinn").forms["fitted"].entry["axis"]["max"]
 
     def codes(value):
         extension.nodes.set_value(node, "e", value)
@@ -226,7 +226,7 @@ def test_a_number_beyond_its_slider_is_warned_of(extension, empty):
 def test_a_fit_has_defaults_but_for_its_number_and_factors(extension, empty):
     """Other values are refused with the reason, and nothing changes."""
     api, pack, nodes = extension.api, extension.pack, extension.nodes
-    only = pack.form_values("lafortune", "fitted")
+    only = pack.model("lafortune").forms["fitted"].only
     assert only == {"cxy": -1, "cz": 0.8}
     material = api.new_material("lafortune", "fitted", e=8.0, ks=(0.5, 0.25, 1.0))
     (node,) = nodes.group_nodes(material)

@@ -64,7 +64,7 @@ def test_without_osl_models_are_blenders_own_nodes(extension, empty, monkeypatch
     bpy.context.view_layer.update()
     for material in (automatic, *made):
         (node,) = extension.nodes.group_nodes(material)
-        assert extension.nodes.identity(node)[1] == "nodes"
+        assert extension.nodes.identity(node).form == "nodes"
         assert extension.checks.warnings(material, empty) == []
     assert extension.api.get_parameters(automatic)["e"] == pytest.approx(20)
     kept = len(bpy.data.node_groups), len(bpy.data.texts), len(bpy.data.materials)

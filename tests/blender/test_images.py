@@ -145,7 +145,7 @@ def test_every_form_against_the_reference(extension, extension_zip, tool, tmp_pa
     materials = {
         f"{model}_{form}": {"model": model, "representation": form}
         for model in extension.pack.model_names()
-        for form in extension.pack.model(model)["representations"]
+        for form in extension.pack.model(model).forms
         if form not in ("fitted", "twin")
     }
     # Only smooth light: if a form hits a lamp once in a thousand samples, the variance of a few

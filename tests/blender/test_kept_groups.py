@@ -3,8 +3,10 @@
 same."""
 
 from importlib import import_module
+from pathlib import Path
 
 import bpy
+import numpy as np
 import pytest
 
 
@@ -84,6 +86,22 @@ def test_what_was_made_once_is_appended(extension, kept, monkeypatch):
         bpy.data.materials.remove(material)
     extension.nodes.remove_unused_groups()
     assert not list(bpy.data.node_groups)
+
+
+@pytest.mark.slow
+def test_what_materials_add_to_a_file(extension, empty, tmp_path):
+    """In bytes, compressed, as docs/nodes.md says: the first material brings the groups that all
+    models share, others of its model next to nothing."""
+    file = str(tmp_path / "grown.blend")
+    sizes = []
+    for model in (None, "phong", "phong", "ward", "factors"):
+        if model:
+            extension.api.new_material(model, "nodes").use_fake_user = True
+        bpy.ops.wm.save_as_mainfile(filepath=file, compress=True, copy=True)
+        sizes.append(Path(file).stat().st_size)
+    first, again, ward, factors = np.diff(sizes)
+    print("KB:", *(np.diff(sizes) // 1000))
+    assert again < 5e3 and ward < 250e3 and first < 650e3 and factors < 800e3
 
 
 @pytest.mark.slow

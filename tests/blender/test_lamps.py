@@ -137,7 +137,7 @@ def test_model_groups_are_fed_by_the_one_group(extension, ball, aimed):
     others = [m for m, e in extension.api.models().items() if form in e["representations"]]
     extension.api.new_material(others[-1], form)
     (shared,) = [g for g in bpy.data.node_groups if g.name.startswith("brdfc Lamps")]
-    count = extension.pack.representation(*aimed)["lamps"]
+    count = extension.pack.model(aimed[0]).forms[aimed[1]].entry["lamps"]
     node = extension.nodes.group_nodes(ball.active_material)[0]
     script = next(n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeScript")
     fed = {s.identifier: s.links[0] for s in script.inputs if s.identifier.startswith("Lamp")}

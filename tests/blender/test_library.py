@@ -64,7 +64,7 @@ def test_every_value_is_one_that_its_model_takes(extension, library, subtests):
     for entry in entries:
         with subtests.test(entry.name):
             for name, value in entry.values.items():
-                extension.pack.check_value(entry.model, name, value)
+                extension.pack.model(entry.model).check_value(name, value)
             assert entry.tags and not entry.description.endswith(".")
 
 
@@ -76,7 +76,7 @@ def test_a_model_of_which_nothing_is_made_is_there_with_its_defaults(
     (tmp_path / "materials.json").write_text(json.dumps(rest), encoding="utf-8")
     monkeypatch.setattr(library, "_HERE", tmp_path)
     (entry,) = [e for e in library.entries() if e.model == "ward"]
-    assert entry.name == extension.pack.model("ward")["label"] and entry.values == {}
+    assert entry.name == extension.pack.model("ward").label and entry.values == {}
     (tmp_path / "materials.json").write_text('{"Metals": [{"name": "x"}]}', encoding="utf-8")
     with pytest.raises(library.LibraryError, match="expected, by catalogue, objects with name"):
         library.entries()
@@ -120,7 +120,7 @@ def test_catalogues_and_what_is_said_of_each_material(extension, library, made, 
         with subtests.test(material.name):
             entry, data = entries[material.name], material.asset_data
             assert catalogs[data.catalog_id] == entry.catalog
-            paper = extension.pack.model(entry.model)["paper"]
+            paper = extension.pack.model(entry.model).paper
             assert entry.description in data.description and paper in data.description
             assert data.author == "brdfc contributors" and data.license == "GPL-3.0-or-later"
             assert set(entry.tags) <= {tag.name for tag in data.tags}

@@ -167,7 +167,7 @@ def test_all_materials_are_all_that_can_be_changed(extension, foreign):
     assert bpy.ops.brdfc.switch(node="Group", representation="aimed", all_users=True) == {
         "FINISHED"
     }
-    assert [extension.nodes.identity(node)[1] for node in shown] == ["aimed", "aimed"]
+    assert [extension.nodes.identity(node).form for node in shown] == ["aimed", "aimed"]
     assert state(extension, theirs) == before
     names = [g.name for g in bpy.data.node_groups if g.library is None]
     assert not [name for name in names if "sampled" in name], "no group stays behind"

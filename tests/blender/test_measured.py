@@ -117,7 +117,7 @@ def test_the_sum_of_lobes_is_added_up(extension, empty, found):
     assert best.error <= found.fits[0].error
     material = extension.api.new_measured_material(found, "lobes")
     assert material.name == "paint"
-    nodes = {extension.nodes.identity(n)[0]: n for n in extension.nodes.group_nodes(material)}
+    nodes = {extension.nodes.identity(n).model: n for n in extension.nodes.group_nodes(material)}
     assert nodes.keys() == {lobe.model for lobe in best.lobes}
     for lobe in best.lobes:
         for name, value in lobe.parameters.items():
@@ -231,7 +231,7 @@ def test_the_operator_makes_the_closest(extension, empty, paint):
     bpy.context.view_layer.objects.active = ball
     assert bpy.ops.brdfc.new_measured_material(filepath=str(paint)) == {"FINISHED"}
     (node,) = extension.nodes.group_nodes(ball.active_material)
-    assert extension.nodes.identity(node)[0] == "ward"
+    assert extension.nodes.identity(node).model == "ward"
     with pytest.raises(RuntimeError, match="There is no file"):
         bpy.ops.brdfc.new_measured_material(filepath=str(paint) + "x")
     handler = bpy.types.FileHandler.bl_rna_get_subclass_py("BRDFC_FH_measured")

@@ -260,14 +260,21 @@ def test_noise_of_a_lamp_seen_from_the_side(extension):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "values", [{}, {"ax": 0.1, "ay": 0.3}, {"distribution": "beckmann"}], ids=str
+    ("model", "values"),
+    [
+        ("microfacet", {}),
+        ("microfacet", {"ax": 0.1, "ay": 0.3}),
+        ("microfacet", {"distribution": "beckmann"}),
+        ("glossy_reflector", {}),
+        ("phong_material", {"ks": 0.0}),
+    ],
+    ids=str,
 )
-def test_noise_of_a_metal(extension, values):
-    """The closure that Cycles has for these facets carries most of the light, so the noise is that
-    of the aimed form, which has the same closure."""
+def test_noise_of_a_metal(extension, model, values):
+    """Closures that Cycles has carry most of the light, so the noise is that of the aimed form,
+    which has similar ones."""
     nodes, aimed = (
-        blocks_of(extension, "microfacet", values, form, from_the_side, 64)
-        for form in ("nodes", "aimed")
+        blocks_of(extension, model, values, form, from_the_side, 64) for form in ("nodes", "aimed")
     )
     off, error, _ = difference(nodes, aimed)
     noise = nodes.var(0, ddof=1).sum() / aimed.var(0, ddof=1).sum()
@@ -365,34 +372,58 @@ def test_links_and_ranges(extension, empty, tool):
     number.outputs[0].default_value = 7.0
     beyond = render(empty)
     assert np.abs(beyond - plain).max() > 1e-3
-    number.outputs[0].default_value = extension.pack.parameters("ward")["ay"]["max"]
+    number.outputs[0].default_value = extension.pack.model("ward").parameters["ay"]["max"]
     np.testing.assert_array_equal(render(empty), beyond)
+
+
+def mean_of_four(extension, form, size, fill):
+    """The mean of pictures with four seeds, and its standard error. `fill`: puts a material of the
+    form into a scene."""
+    found = []
+    for seed in range(4):
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        scene = bpy.context.scene
+        settings(extension, scene, 64, osl=form != "nodes", size=size)
+        scene.cycles.seed = seed
+        fill(scene, form)
+        found.append(render(scene)[..., 1].mean())
+    return np.mean(found), np.std(found, ddof=1) / 2
+
+
+@pytest.mark.slow
+def test_facets_along_the_view_at_right_angles_to_it(extension):
+    """The view has no part across the normal then, and the facets no direction of their own."""
+
+    def plane(scene, form):
+        add_camera(scene, (0, 0, 4), (0, 0, 0), orthographic=1.0)
+        bpy.ops.mesh.primitive_plane_add()
+        material = extension.api.new_material("glossy_reflector", form)
+        bpy.context.object.data.materials.append(material)
+        add_lamp(scene, "POINT", "Ball", (0.3, 0, 3), energy=300, shadow_soft_size=0.3)
+        extension.api.see_lamps(scene)
+
+    (a, of_a), (b, of_b) = (mean_of_four(extension, f, 16, plane) for f in ("nodes", "aimed"))
+    print(f"{a:.4f} ± {of_a:.4f}, {b:.4f} ± {of_b:.4f}")
+    assert b > 0.1
+    assert abs(a - b) < 4.5 * math.hypot(of_a, of_b) + 3e-3 * b
 
 
 @pytest.mark.slow
 def test_a_bent_normal_takes_the_base_away(extension):
     """Cycles would darken a base about it, and the random direction would not compensate."""
 
-    def bent(form):
-        found = []
-        for seed in range(4):
-            bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-            scene = bpy.context.scene
-            settings(extension, scene, 64, osl=form != "nodes", size=32)
-            scene.cycles.seed = seed
-            add_camera(scene, (0, -4, 0), (math.pi / 2, 0, 0), orthographic=2.2)
-            material = extension.api.new_material("coupled", form)
-            (node,) = extension.nodes.group_nodes(material)
-            vector = material.node_tree.nodes.new("ShaderNodeCombineXYZ")
-            for socket, value in zip(vector.inputs, (0.5, -0.7, 0.5), strict=True):
-                socket.default_value = value
-            material.node_tree.links.new(vector.outputs[0], node.inputs["Normal"])
-            add_sphere(scene, material, segments=64)
-            white_world(scene)
-            found.append(render(scene)[..., 1].mean())
-        return np.mean(found), np.std(found, ddof=1) / 2
+    def bent(scene, form):
+        add_camera(scene, (0, -4, 0), (math.pi / 2, 0, 0), orthographic=2.2)
+        material = extension.api.new_material("coupled", form)
+        (node,) = extension.nodes.group_nodes(material)
+        vector = material.node_tree.nodes.new("ShaderNodeCombineXYZ")
+        for socket, value in zip(vector.inputs, (0.5, -0.7, 0.5), strict=True):
+            socket.default_value = value
+        material.node_tree.links.new(vector.outputs[0], node.inputs["Normal"])
+        add_sphere(scene, material, segments=64)
+        white_world(scene)
 
-    (a, of_a), (b, of_b) = map(bent, ("nodes", "sampled"))
+    (a, of_a), (b, of_b) = (mean_of_four(extension, f, 32, bent) for f in ("nodes", "sampled"))
     assert abs(a - b) < 4.5 * math.hypot(of_a, of_b) + 1e-3 * b, (a, b, of_a, of_b)
 
 
@@ -437,12 +468,12 @@ def test_a_choice_without_nodes_is_a_sentence(extension, empty):
     material = extension.api.new_material("ashikhmin_shirley", "aimed", diffuse="tabulated")
     with pytest.raises(ValueError, match="only for"):
         extension.api.switch_representation(material, "nodes")
-    assert extension.nodes.identity(extension.nodes.group_nodes(material)[0])[1] == "aimed"
+    assert extension.nodes.identity(extension.nodes.group_nodes(material)[0]).form == "aimed"
 
 
 def test_auto_takes_other_forms(extension, empty):
     for name in extension.api.models():
-        assert extension.pack.resolve(name, "auto") not in ("nodes", "twin")
+        assert extension.pack.model(name).resolve("auto").name not in ("nodes", "twin")
 
 
 def test_a_group_a_model_and_none_that_is_left(extension, empty):

@@ -109,7 +109,7 @@ def test_exact_form_under_a_sun(extension, empty, tool, batch, request, model, v
     expected = np.zeros_like(wi)
     expected[lit] = evaluate(tool, model, values, wi[lit], wo[lit]) * wi[lit, 2:]
     measured, expected = measured[clear], expected[clear]
-    if not extension.pack.model(model)["scatter"]:
+    if not extension.pack.model(model).entry["scatter"]:
         assert measured.max() == 0, "a delta term can't meet a lamp without size"
         return
     assert (expected > 0).mean() > 0.3
@@ -482,7 +482,7 @@ TABLES = with_every_model(
 )
 def test_albedo_output_panel_and_model_agree(extension, empty, tool, model, values):
     cosines = np.linspace(0.02, 1, 50)
-    entry = extension.pack.model(model)
+    entry = extension.pack.model(model).entry
     quadrature = albedo(tool, model, values, cosines)
     if entry.get("albedo"):
         expected = np.array([extension.api.albedo(model, c, **values) for c in cosines])
@@ -498,10 +498,10 @@ def test_albedo_output_panel_and_model_agree(extension, empty, tool, model, valu
     else:
         expected = quadrature  # only delta terms, with more parameters than a table has axes
 
-    for form in extension.pack.model(model)["representations"]:
+    for form in extension.pack.model(model).forms:
         # A twin has its own albedo, which test_every_fit.py measures.
-        unavailable = extension.pack.reason_unavailable(model, form, values)
-        if unavailable or extension.pack.is_native(model, form):
+        unavailable = extension.pack.model(model).forms[form].refusal(values)
+        if unavailable or extension.pack.model(model).forms[form].is_native:
             continue
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
         scene, material = start(extension, model, form, values, max_bounces=0)

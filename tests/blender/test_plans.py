@@ -127,7 +127,7 @@ def test_a_choice_that_is_driven_stays_one(extension, empty, api):
     if choice.type == "MENU":
         pytest.skip("from Blender 5.0 a choice can't be animated")
     choice.driver_add("default_value").driver.expression = "1 if frame > 5 else 0"
-    first, last = extension.pack.parameters("ward")["normalisation"]["choices"][:2]
+    first, last = extension.pack.model("ward").parameters["normalisation"]["choices"][:2]
     assert api.bake(api.plan()) == 1
     for frame, expected in ((1, first), (10, last)):
         empty.frame_set(frame)

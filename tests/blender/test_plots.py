@@ -150,7 +150,7 @@ def over_the_hemisphere(wo, count=120):
 
 def light_of(extension, plots, form_light, material):
     (node,) = extension.nodes.group_nodes(material)
-    model = plots.brdfc.model(extension.nodes.identity(node)[0])
+    model = plots.brdfc.model(extension.nodes.identity(node).model)
     values = plots.values_in_range(model, extension.api.get_parameters(material))
     form = functools.partial(form_light.lobes, node) if extension.nodes.is_fitted(node) else None
     return plots.light(model, values, form)
@@ -390,7 +390,7 @@ def of_form(form_light, plots, extension, material, wi, wo):
     """f cos of a material's form at its values, for several views wo and light directions wi of
     each."""
     (node,) = extension.nodes.group_nodes(material)
-    model = plots.brdfc.model(extension.nodes.identity(node)[0])
+    model = plots.brdfc.model(extension.nodes.identity(node).model)
     values = plots.values_in_range(model, extension.api.get_parameters(material))
     lobes = form_light.lobes(node, plots._complete(model, values), np.array(wo))
     return [lobes.scattered(w[None], slice(i, i + 1))[0] for i, w in enumerate(wi)]
@@ -460,8 +460,8 @@ TWINS = {
 def test_the_curve_of_a_twin_is_that_of_the_tool(off_the_tool, extension, empty):
     """Blender's nodes are in single precision."""
     for model, values in TWINS.items():
-        axis = extension.pack.representation(model, "twin")["axis"]
-        mixed = json.loads(extension.pack.source(model, "twin")[1])["mixed"]
+        axis = extension.pack.model(model).forms["twin"].entry["axis"]
+        mixed = json.loads(extension.pack.model(model).forms["twin"].source()[1])["mixed"]
         over = [*(["--over", axis["name"]] if axis else []), *(["--any", *mixed] if mixed else [])]
         off = off_the_tool("twin", model, values, *over)
         print(f"{model}: {off:.2g}")
@@ -816,7 +816,7 @@ def test_the_panel_names_what_it_cannot_know(extension, panel, plots, empty, mon
     node.id_data.links.new(value.outputs[0], extension.nodes.sockets(node)["m"])
     layout = helpers.Layout()
     panel.draw_plots(layout, material)
-    label = extension.pack.parameters("cook_torrance")["m"]["label"]
+    label = extension.pack.model("cook_torrance").parameters["m"]["label"]
     assert f"At the default of {label}" in layout.log
     # A model that a pack cut to a scene lacks causes a message, and no exception.
     monkeypatch.setattr(plots.brdfc, "NAMES", ())

@@ -66,7 +66,7 @@ def test_a_scene_renders_from_its_own_extension(extension, empty, answers, tool,
         scene = SceneLoader(module("api").__package__).load_scene(tmp_path / "scene" / "scene.json")
         picture = render(scene)[..., :3]
         made = {m.name: module("groups.nodes").group_nodes(m) for m in bpy.data.materials}
-        models = {module("groups.nodes").identity(n)[0] for ours in made.values() for n in ours}
+        models = {module("groups.nodes").identity(n).model for ours in made.values() for n in ours}
     assert models == {m["model"] for m in content["materials"].values()}
     assert np.isfinite(picture).all() and picture.max() > 1e-3
 
@@ -99,9 +99,9 @@ def test_a_scene_renders_from_its_own_extension_without_osl(
         try:
             scene = load(tmp_path / "scene" / "scene.json", osl=osl)
             ours = [n for m in bpy.data.materials for n in extension.nodes.group_nodes(m)]
-            assert {extension.nodes.identity(node)[1] for node in ours} == wanted
+            assert {extension.nodes.identity(node).form for node in ours} == wanted
             pictures[pack, osl] = render(scene)[..., :3]
-            assert {extension.nodes.identity(node)[1] for node in ours} == wanted
+            assert {extension.nodes.identity(node).form for node in ours} == wanted
         finally:
             extension.pack.use()
     with_osl = pictures["both", True]
@@ -184,20 +184,21 @@ def stands_in(node):
 @pytest.mark.parametrize("part", FOLDED)
 def test_every_model_with_constants_loads_with_its_twin(extension, empty, use_pack, few_of, part):
     api, nodes, pack = extension.api, extension.nodes, extension.pack
+    canonical = extension.parameter_values.canonical
     whole = json.loads(json.dumps(dict(few_of(pack.manifest()["models"].items(), 5))))
     materials = materials_of(whole, part)
     albedos = {
-        name: extension.energy.albedo(name, pack.canonical(values_of(entry)), 0.7)
+        name: extension.energy.albedo(name, canonical(values_of(entry)), 0.7)
         for name, entry in whole.items()
         if entry.get("albedo")
     }
     use_pack(materials)
     for name, entry in whole.items():
-        values = pack.canonical(values_of(entry))
-        fixed = pack.fixed(name)
+        values = canonical(values_of(entry))
+        fixed = pack.model(name).fixed
         assert {"all": len(fixed) == len(values), "none": not fixed, "some": True}[part], name
-        for form in pack.model(name)["representations"]:
-            only = pack.form_values(name, form)
+        for form in pack.model(name).forms:
+            only = pack.model(name).forms[form].only
             given = {k: v for k, v in (values | only).items() if k not in fixed}
             material = api.new_material(name, form, **given)
             (node,) = nodes.group_nodes(material)
@@ -206,7 +207,8 @@ def test_every_model_with_constants_loads_with_its_twin(extension, empty, use_pa
             assert sockets.isdisjoint(fixed) and sockets <= set(given)
             complete = nodes.all_values(node)
             for key, value in (values | only | fixed).items():
-                assert pack.equal_in_float32(complete[key], value), (name, form, key)
+                equal = extension.parameter_values.equal_in_float32(complete[key], value)
+                assert equal, (name, form, key)
             for socket, found in stands_in(node).items():
                 check_stand_in(socket, found, fixed)
             if name in albedos and not only:

@@ -106,8 +106,8 @@ def test_the_panel_in_other_languages(extension, empty, phong, speak, locale, er
     assert off.replace(" ", "") in "".join(text.split()), "over two lines"
     assert "Language is off" not in text and "Language is off" in " ".join(english.log)
     # Names of models and parameters are those of the papers.
-    assert extension.pack.model("phong")["label"] in text
-    for label in (p["label"] for p in extension.pack.parameters("phong").values()):
+    assert extension.pack.model("phong").label in text
+    for label in (p["label"] for p in extension.pack.model("phong").parameters.values()):
         assert label in text
     (finding,) = [f for f in extension.api.warnings(phong, empty) if f.code == "osl_off"]
     assert finding.message.startswith("Open Shading Language is off"), "scripts have English"

@@ -303,7 +303,7 @@ def test_all_models_that_scatter_have_a_twin_and_none_takes_it_unasked(extension
         assert ("twin" in entry["representations"]) == entry["scatter"], name
         assert entry["auto"] != "twin"
         values = {p["name"]: None for p in entry["parameters"]}  # all linked
-        assert extension.pack.resolve(name, "auto", values) != "twin"
+        assert extension.pack.model(name).resolve("auto", values).name != "twin"
 
 
 @pytest.mark.slow
@@ -374,7 +374,7 @@ def test_tables_over_a_slider_are_what_the_tool_judges(extension, tool, empty):
     wo, picture = meter.wo(), meter.measure()
     for i, (name, values) in enumerate(SLIDERS.items()):
         lit = (which == i) & (wi[:, 2] > 1e-3) & (wo[:, 2] > 0.02)
-        axis = extension.pack.representation(name, "twin")["axis"]
+        axis = extension.pack.model(name).forms["twin"].entry["axis"]
         mixed = [n for n in values if n in ("f0", "r", "r0")]
         over = ["--over", axis["name"]] if axis else []
         over += ["--any", *mixed] if mixed else []

@@ -115,7 +115,7 @@ def test_drawn_form_is_as_noisy_as_its_sampler(
 def test_a_form_of_the_same_mean_that_wastes_samples_is_found(extension, empty, tool):
     """Seven of eight sampled directions have weight 0, the others eight times the weight."""
     model = "ward"
-    source = extension.pack.source(model, "sampled")[1]
+    source = extension.pack.model(model).forms["sampled"].source()[1]
     weight = "BSDF = weight *"
     wasteful = (
         "vector more = brdfc_random(99, path_length); "

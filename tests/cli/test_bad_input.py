@@ -79,6 +79,16 @@ def test_a_scene_that_is_no_scene(text, word, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["bad.json"]
 
 
+@pytest.mark.parametrize("command", [("render",), ("build", "--scene"), ("build", "--materials")])
+@pytest.mark.parametrize("content", [b"\0\0\0", b"PK\x03\x04", b"v/1\x01", b'{"a": 1}\0'])
+def test_a_file_that_is_no_text(content, command, tmp_path):
+    """nlohmann takes a byte 0 for the end of the input, and would say so."""
+    file = tmp_path / "bad.bin"
+    file.write_bytes(content)
+    done = run(*command, file, "--out", tmp_path / "a.exr")
+    refused(done, "bad.bin: expected JSON, found bytes that are no text")
+
+
 def test_names_reach_no_path(tmp_path):
     """Names in a scene are only text, even if they look like paths."""
     name = '../../e"vil\n$(touch x)'

@@ -179,7 +179,7 @@ def test_eval_says_what_is_wrong_with_its_input(stdin, words):
 @pytest.mark.parametrize(
     ("args", "words"),
     [
-        (["eval", "phng"], ["'phng'", "did you mean phong?", *MODELS]),
+        (["eval", "phng"], ["'phng'", "did you mean phong?", "`brdfc list`"]),
         (["eval", "phong", "kz=1"], ["'kz'", "did you mean ks?"]),
         (["eval", "lambert", "rh=1"], ["lambert", "'rh'", "rho"]),
         (["eval", "lambert", "rho=2"], ["lambert", "rho", "[0, 1]", "2"]),
@@ -207,7 +207,7 @@ def test_eval_says_what_is_wrong_with_its_input(stdin, words):
         (["sample", "lambert", "--seed", "3"], ["--count"]),
         (["albedo", "lambert", "--count", "1"], ["--count"]),
         (["check", "lambert", "--all"], ["--all"]),
-        (["check", "phng"], ["'phng'", *MODELS]),
+        (["check", "phng"], ["'phng'", "did you mean phong?", "`brdfc list`"]),
     ],
 )
 def test_wrong_usage_is_one_line_and_status_2(args, words):

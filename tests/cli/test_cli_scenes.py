@@ -61,6 +61,7 @@ def test_help_goes_to_stdout():
         (["compare", "alone.exr"], "got alone.exr alone"),
         (["report", "absent"], "absent"),
         (["list", "warrd"], "did you mean ward? "),
+        (["list", "fresnel"], "did you mean fresnel_conductor or fresnel_dielectric? "),
     ],
 )
 def test_wrong_use_exits_2_with_one_line(arguments, says, tmp_path):

@@ -312,3 +312,36 @@ def test_gltf_that_can_not_be_read(change, words, tmp_path):
     text = json.loads(g.text())
     change(text)
     refused(tmp_path, "a.gltf", json.dumps(text), words)
+
+
+def test_spheres_of_many_sizes_share_a_mesh(tmp_path):
+    """Beyond the limit of triangles that are copied, spheres that differ only in their radius are
+    one mesh, which is scaled."""
+    shapes = [{"type": "sphere", "segments": 1536, "radius": r} for r in (0.5, 0.75, 0.25, 3)]
+    places = [{}, {}, {"transform": {"scale": [1, 2, 3]}}, {}]
+    objects = [
+        {"name": f"o{i}", "shape": shape, "material": "m", **place}
+        for i, (shape, place) in enumerate(zip(shapes, places, strict=True))
+    ]
+    (tmp_path / "s.json").write_text(json.dumps(scene(objects=objects)), encoding="utf-8")
+    done = run("scene", tmp_path / "s.json", "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "out" / "scene.json").read_text(encoding="utf-8"))["objects"]
+    assert len({o["shape"]["vertices"] for o in found}) == 2
+    for item, (size, scale) in zip(
+        found, ((0.5, [1, 1, 1]), (0.75, [1, 1, 1]), (0.25, [1, 2, 3]), (3, [1, 1, 1])), strict=True
+    ):
+        largest = np.abs(np.load(tmp_path / "out" / item["shape"]["vertices"])).max(0)
+        np.testing.assert_allclose(
+            largest * item["transform"]["scale"], size * np.array(scale), rtol=1e-6
+        )
+
+
+def test_sizes_of_shared_spheres_are_checked(tmp_path):
+    objects = [
+        {"name": f"o{i}", "shape": {"type": "sphere", "segments": 1536} | more, "material": "m"}
+        for i, more in enumerate(({}, {"radius": -1}))
+    ]
+    (tmp_path / "s.json").write_text(json.dumps(scene(objects=objects)), encoding="utf-8")
+    done = run("scene", tmp_path / "s.json", "--out", tmp_path / "out")
+    assert done.returncode == 2 and "objects[1].shape.radius: expected a number" in done.stderr

@@ -25,8 +25,11 @@ std::vector<ParamValues> cases_of(const ModelInfo& info) {
   return cases;
 }
 
-/// Facets that have another masking: their light beyond the model's is judged as a whole.
-bool exceeds_a_little(const std::string& name) { return name == "blinn" || name == "cook_torrance" || name == "ward"; }
+/// Facets with another masking, or below a lobe of another shape: their light beyond the model's is judged as a whole.
+bool exceeds_a_little(const std::string& name) {
+  static const std::set<std::string> names = {"blinn", "cook_torrance", "glossy_reflector", "phong_material", "ward"};
+  return names.count(name) == 1;
+}
 
 TEST(Under, ExceedsTheModelByALittleOfItsLightAtMost) {
   measure::Random random(14);
@@ -90,12 +93,16 @@ const UnderRow kUnderRows[] = {{"ashikhmin_shirley", {"rs=0,0,0"}, 0.9},
                                {"coupled", {}, 0.94},
                                {"eon", {}, 0.97},
                                {"eon", {"rho=1"}, 0.999999},
+                               {"glossy_reflector", {}, 0.98},
+                               {"glossy_reflector", {"e=1"}, 0.4},
+                               {"glossy_reflector", {"e=20", "below=lose"}, 0.94},
                                {"microfacet", {}, 0.9},
                                {"microfacet", {"distribution=multiscatter_ggx", "ax=0.6", "ay=0.6"}, 0.9},
                                {"microfacet", {"distribution=beckmann", "ax=0.5", "ay=0.1"}, 0.9},
                                {"oren_nayar", {}, 0.75},
                                {"oren_nayar", {"form=qualitative"}, 0.9},
                                {"phong_material", {"ks=0", "kr=0"}, 0.999},
+                               {"phong_material", {"ks=0"}, 0.98},
                                {"schlick", {}, 0.75},
                                {"schlick", {"rough=0.9"}, 0.7},
                                {"schlick_double", {}, 0.9},
@@ -142,8 +149,10 @@ TEST(Under, IsRecordedAlikeForAllChoices) {
         EXPECT_TRUE(c.kind != ClosureKind::OrenNayar ||
                     (c.weight.is_constant(&weight) && weight == std::array{1.0, 1.0, 1.0}))
             << name;
-        EXPECT_FALSE(c.turned || c.stretched == Tangent::View) << name;
-        EXPECT_TRUE(c.tangent.x.is_literal(1) && c.tangent.y.is_literal(0) && c.tangent.z.is_literal(0)) << name;
+        EXPECT_FALSE(c.turned) << name;
+        EXPECT_TRUE(c.stretched == Tangent::View ||
+                    (c.tangent.x.is_literal(1) && c.tangent.y.is_literal(0) && c.tangent.z.is_literal(0)))
+            << name;
         here.push_back(c.kind);
       }
       if (kinds.empty()) kinds = here;

@@ -8,6 +8,9 @@ import numpy as np
 from .. import slots
 from .light import ASIDE, Light, keeps_its_place, seen_from
 
+#: Watts per square metre.
+_MODERATE = 100
+
 
 def _is_round(light):
     return light.shape in {"DISK", "ELLIPSE"}
@@ -56,6 +59,9 @@ class Area(Light):
 
     def is_sizeless(self, light):
         return False
+
+    def is_moderate(self, light):
+        return light.normalize and light.energy <= _MODERATE * self.extent(light)
 
     def is_distorted(self, matrix):
         return slots.is_sheared(matrix)

@@ -104,6 +104,11 @@ class Light(Kind, ABC):
         """Whether it is of the type of a new light in Blender, no brighter and no smaller."""
         return False
 
+    def is_moderate(self, light):
+        """Whether a clamp of indirect light at 10 takes no light of it from materials without a
+        mirror."""
+        return False
+
     # ---- what follows from that ------------------------------------------------------------------
 
     def power(self, light):

@@ -31,5 +31,9 @@ class Point(Light):
         return slots.angular_size_at(matrix.translation, light.shadow_soft_size)
 
     def is_like_new(self, light):
-        watts, radius = _NEW
-        return light.energy <= watts and light.shadow_soft_size >= radius * (1 - 1e-6)
+        radius = _NEW[1]
+        return self.is_moderate(light) and light.shadow_soft_size >= radius * (1 - 1e-6)
+
+    def is_moderate(self, light):
+        # Smaller ones are brighter, but random rays meet them less often.
+        return light.energy <= _NEW[0]

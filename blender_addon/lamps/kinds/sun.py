@@ -10,6 +10,8 @@ from .light import Light
 
 #: From this angle on (radians), a sun that random rays do not meet is noisy in highlights.
 _WIDE = 0.5
+#: Irradiance of a sun on a clear day, in the units of Blender's suns.
+_MODERATE = 3
 
 
 class Sun(Light):
@@ -34,3 +36,6 @@ class Sun(Light):
 
     def is_wide(self, light):
         return light.angle > _WIDE
+
+    def is_moderate(self, light):
+        return light.energy <= _MODERATE
