@@ -7,7 +7,7 @@ Scripts use `api`: `from bl_ext.user_default.brdfc_shaders import api`.
 import bpy
 
 from . import lamps, operators
-from .common import i18n
+from .common import enabling, i18n
 from .groups import automatic, imports, update
 from .panels import plot_panel, ui
 from .warnings import closure_slots, console
@@ -36,9 +36,11 @@ def register():
     imports.register()
     update.register()
     console.register()
+    enabling.set_registered(True)
 
 
 def unregister():
+    enabling.set_registered(False)
     console.unregister()
     update.unregister()
     imports.unregister()

@@ -19,7 +19,7 @@ from pathlib import Path
 import bpy
 
 from . import convert, lamps, lean, library, measured
-from .common import argument_checks, editable, files
+from .common import argument_checks, editable, enabling, files
 from .common.i18n import say
 from .content.compiler import CompileError
 from .groups import automatic, bump_correction, nodes, update, usage
@@ -273,6 +273,7 @@ def set_parameters(material, node=None, **parameters):
 
 
 def _set(node, what, parameters):
+    enabling.enable()
     editable.check(node.id_data)
     model, representation = nodes.identity(node).model, nodes.form_in_script(node)
     lean_node = nodes.is_baked(node)
@@ -577,6 +578,7 @@ def see_lamps(scene):
     are examined here only. Returns every lamp as a Lamp: its name, its slot (from 1, or None), its
     irradiance at the subject, by which lamps are ranked, and why it was left out.
     """
+    enabling.enable()
     return lamps.refresh(argument_checks.scene(scene))
 
 

@@ -2,8 +2,10 @@
 """Makes node groups of the lists of operations that the tool writes. Equal groups are made once for
 all materials; the others are removed when nothing uses them."""
 
+import contextlib
 import hashlib
 import json
+import threading
 
 import bpy
 
@@ -97,8 +99,32 @@ def make_group(title, content, inputs, outputs, fill, kept=False):
     digest = hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
     if group := _find(digest) or (_appended(digest) if kept else None):
         return group
-    group = bpy.data.node_groups.new(f"brdfc {title}", "ShaderNodeTree")
+    with _wait_cursor() if kept else contextlib.nullcontext():
+        group = _filled(f"brdfc {title}", inputs, outputs, fill)
     group[PART] = digest
+    if kept:
+        kept_groups.keep(group, digest)
+    return group
+
+
+@contextlib.contextmanager
+def _wait_cursor():
+    """Shows that Blender is busy, as long as a model's nodes are built for the first time."""
+    # Handlers of renders run in other threads, which must not touch windows.
+    of_interface = threading.current_thread() is threading.main_thread()
+    windows = list(bpy.context.window_manager.windows) if of_interface else []
+    for window in windows:
+        window.cursor_modal_set("WAIT")
+    try:
+        yield
+    finally:
+        for window in windows:
+            window.cursor_modal_restore()
+
+
+def _filled(name, inputs, outputs, fill):
+    """A new group of nodes; arguments as of make_group()."""
+    group = bpy.data.node_groups.new(name, "ShaderNodeTree")
     for in_out, sockets in (("INPUT", inputs), ("OUTPUT", outputs)):
         for name, kind in sockets:
             group.interface.new_socket(name, in_out=in_out, socket_type=_SOCKETS[kind])
@@ -109,8 +135,6 @@ def make_group(title, content, inputs, outputs, fill, kept=False):
     for name, value in made.items():
         w.give(end.inputs[name], value)
     w.place_nodes()
-    if kept:
-        kept_groups.keep(group, digest)
     return group
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import bpy
 
 from .. import lamps
-from ..common import editable
+from ..common import editable, enabling
 from ..common.i18n import say
 from ..content import group_content, part_groups, stand_in
 from ..content.group_content import ALBEDO, is_native, script_problem
@@ -112,13 +112,15 @@ def _clear_fake_users(group):
 
 
 def ensure_group(model_name, representation="auto", baked=None, albedo=False, values=None):
-    """Finds or makes the node group of a model. Raises ValueError, CompileError.
+    """Finds or makes the node group of a model, and enables the extension, whose handlers fill in
+    the lamps. Raises ValueError, CompileError.
 
     Leaves nothing in the file on failure. A group of "auto" adapts to the scene if the model has a
     form for that; see adapt_to_scene(). `values` of the parameters decide which forms are
     available. `baked`: hash of the extension in whose place the pack of the open file is in use
     (see pack.use). `albedo`: adds the Albedo output even if that takes a script with large tables.
     """
+    enabling.enable()
     model = pack.model(model_name)
     if representation == "auto" and not baked:
         with_osl = model.automatic(values)

@@ -112,9 +112,13 @@ def make(api, entry):
 
 
 def description(entry):
-    """The material's description in the Asset Browser: its sentence and the model's paper."""
+    """The material's description in the Asset Browser: its sentence, the model's paper, and whether
+    Open Shading Language matters."""
     model = pack.model(entry.model)
-    return f"{entry.description}. {model.label}: {model.paper}"
+    text = f"{entry.description}. {model.label}: {model.paper}"
+    if model.native_form and model.native_form.refusal(entry.values):
+        text += ". Without Open Shading Language an approximation is shown"
+    return text
 
 
 def tags(entry):

@@ -23,7 +23,7 @@ MODULES = ("library", "library.preview", "api")
 
 
 def load_package():
-    """Imports the extension that contains this file, under a name of its own."""
+    """Imports and registers the extension that contains this file, under a name of its own."""
     root = Path(__file__).resolve().parent.parent
     spec = importlib.util.spec_from_file_location(
         "brdfc_at_work", root / "__init__.py", submodule_search_locations=[str(root)]
@@ -31,6 +31,7 @@ def load_package():
     package = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = package
     spec.loader.exec_module(package)
+    package.register()
     return spec.name
 
 

@@ -18,6 +18,10 @@ from .misplaced_light import NARROWEST, Target
 #: A candidate is examined closely if its error at a roughly fitted width is at most this times the
 #: smallest one.
 _CANDIDATE_MARGIN = 1.1
+#: A candidate with the node's own formulas is taken without a look at the others if its error is at
+#: most this: as it stands, and as a layer over a base. Of a thousand random nodes none had another
+#: candidate nearer by more than 0.002 then.
+_OWN_ERROR, _OWN_LAYER_ERROR = 0.001, 0.02
 #: Limit of parabola steps, and the distance of log widths below which another step is of no use.
 _PARABOLAS, _LOG_WIDTH_TOLERANCE = 4, 0.02
 
@@ -51,6 +55,8 @@ class Candidate:
     #: Whether it reflects the same at all angles: its values are for the node's colour divided by
     #: scale_of(), by which a Mix Shader multiplies its light.
     is_flat: bool = False
+    #: Whether its lobe is the node's own, with the usual width.
+    is_own: bool = False
 
     @property
     def is_colored(self):
@@ -147,6 +153,7 @@ _COLORED = (
         lambda n: {"f0": n.color, "tint": _edge_tint(n), **_distribution(n)},
         _FACETS,
         {"f0": "Color"},
+        is_own=True,
     ),
     Candidate(
         "ward",
@@ -161,9 +168,9 @@ _COLORED = (
     ),
 )
 #: For a Glossy node, which reflects the same at every angle.
-_FLAT = Candidate("microfacet", _flat, _FACETS, {"f0": "Color"}, is_flat=True)
+_FLAT = Candidate("microfacet", _flat, _FACETS, {"f0": "Color"}, is_flat=True, is_own=True)
 _MATTE = (
-    Candidate("lambert", lambda n: {"rho": n.color}, None, {"rho": "Color"}),
+    Candidate("lambert", lambda n: {"rho": n.color}, None, {"rho": "Color"}, is_own=True),
     Candidate("eon", lambda n: {"rho": n.color}, Width("r", 1e-3, 1.0, 1), {"rho": "Color"}),
     *(
         Candidate(
@@ -218,7 +225,11 @@ def _layered(native, has):
         return ()
     f0, tint = zip(*(layer.schlick_like(native.f0, t) for t in native.tint), strict=True)
     values = {"f0": f0, "tint": tint}
-    return (Candidate("microfacet", lambda n: values | _distribution(n), _FACETS, base=base),)
+
+    def layer_of(n):
+        return values | _distribution(n)
+
+    return (Candidate("microfacet", layer_of, _FACETS, base=base, is_own=True),)
 
 
 def candidates(native, has=lambda model, values: True):
@@ -284,9 +295,22 @@ def nearest(natives, colors, colored, has):
     errors for nodes of other colours, `colors`. `colored`: whether the node's colour is linked; a
     model without a colour parameter would lose that link."""
     native, targets, found = natives[0], [Target(n) for n in natives], []
+
+    def fit(candidate, factor, error, lost):
+        known = {native.color: (_light(targets), error)}
+        errors = (known.get(c) or _light_and_error(candidate, targets, factor, c) for c in colors)
+        return Fit(candidate, factor, tuple(errors), lost)
+
+    considered = candidates(native, has)
+    for candidate in considered:
+        if candidate.is_own and (candidate.is_colored or not colored):
+            factor = candidate.width.usual if candidate.width else 1.0
+            error = _mean(Target.error, candidate, targets, factor)
+            if error <= (_OWN_LAYER_ERROR if candidate.base else _OWN_ERROR):
+                return fit(candidate, factor, error, lost=False)
     # The width hardly depends on the base, so it is fitted once for all of them.
     roughly, closely = {}, {}
-    for candidate in candidates(native, has):
+    for candidate in considered:
         if any(n.stretch != 1 for n in natives) and not (
             candidate.width and candidate.width.across
         ):
@@ -309,9 +333,7 @@ def nearest(natives, colors, colored, has):
             error = _mean(Target.error, candidate, targets, closely[key])
             fits.append((error, closely[key], candidate))
     error, factor, candidate = min(fits, key=lambda f: f[0])
-    known = {native.color: (_light(targets), error)}
-    errors = tuple(known.get(c) or _light_and_error(candidate, targets, factor, c) for c in colors)
-    return Fit(candidate, factor, errors, best[0])
+    return fit(candidate, factor, error, best[0])
 
 
 def _light(targets):

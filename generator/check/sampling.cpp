@@ -106,7 +106,11 @@ void histogram(const Trial& t, Verdict& verdict) {
     double cos_o = c.index % 4 == 0 ? 1 : 0.15 + 0.8 * measure::uniform(random);
     if (measure::two_sided(t.model(), *c.bound.brdf) && c.index % 4 > 1) cos_o = -cos_o;
     const Vec3<double> wo = direction(cos_o, 2 * kPi * measure::uniform(random));
-    const ChiSquare of = chi_square(c.bound, wo, std::max(10000, t.scaled(30000)), random());
+    const int samples = std::max(10000, t.scaled(30000));
+    ChiSquare of = chi_square(c.bound, wo, samples, random());
+    // One case in a hundred of a right model gets here. With new and more samples it stands out again as rarely as any
+    // other, so that right models are refused with a probability of 1e-4.
+    if (of.converged && of.p < kSignificance) of = chi_square(c.bound, wo, 4 * samples, random());
     if (!of.converged) return verdict.skip();
     const std::lock_guard lock(mutex);
     found.push_back({of, fmt::format("{} wo={} statistic={:.4g} degrees={}", c.bound.label, measure::text(wo),
@@ -128,7 +132,7 @@ std::vector<Check> sampling_checks(const ModelProperties& claims) {
        without_upper_lobe},
       {"pdf integral", "integral of pdf + lost samples = 1", at_most(kNormalisation), normalised, without_lobe},
       {"sample weight", "weight pdf = f cos, sample's pdf = pdf()", at_most(kIdentity), weights, without_lobe, true},
-      {"chi-square", "p > 0.01 over all cases (Sidak)", at_least(kSignificance), histogram, without_lobe}};
+      {"chi-square", "p > 0.01 over all cases (Sidak), twice", at_least(kSignificance), histogram, without_lobe}};
 }
 
 }  // namespace brdfc::check

@@ -30,6 +30,14 @@ template <class T> T fresnel_conductor(const T& cosTheta, const T& sin2, const T
 /// The shares of light that a smooth dielectric boundary reflects and transmits; their sum is 1.
 template <class T> struct Dielectric { T reflected, refracted; };
 
+/// The transmitted share where the cosine of the refracted direction is known: `g` is that times `eta`. A direction that
+/// is given by a half vector has g = eta |wi.h|, which is precise near the critical angle, where sin^2 is not.
+template <class T> T refracted_share(const T& cosTheta, const T& g, const T& eta) {
+  const T eta2 = eta * eta;
+  const T ds = named("d_s", sqr(cosTheta + g)), dp = named("d_p", sqr(eta2 * cosTheta + g));
+  return T(2) * cosTheta * g * (T(1) / ds + eta2 / dp);
+}
+
 /// `eta` is the index of the far side divided by that of the incident side. With g^2 = eta^2 - sin^2,
 ///   r_s = (1 - eta^2) / (c + g)^2,  r_p = (eta^2 - 1) (eta^2 c^2 - s^2) / (eta^2 c + g)^2,
 /// where differences of similar numbers are expanded. T has its own formula and is not computed as 1 - R.
@@ -44,7 +52,7 @@ template <class T> Dielectric<T> fresnel_dielectric(const T& cosTheta, const T& 
   const T rs = named("r_s", step / ds);
   const T ec = eta * cosTheta;
   const T rp = named("r_p", step * ((ec - sine) * (ec + sine)) / dp);
-  const T through = T(2) * cosTheta * g * (T(1) / ds + eta2 / dp);
+  const T through = refracted_share(cosTheta, g, eta);
   return {named("R_f", select(total, T(1), (rs * rs + rp * rp) / T(2))), named("T_f", select(total, T(0), through))};
 }
 

@@ -34,6 +34,24 @@ def misplaced_light(convert):
     return import_module("..nearest.misplaced_light", convert.__package__)
 
 
+def test_no_other_model_is_examined_where_one_has_the_nodes_formulas(convert, monkeypatch):
+    # A hundred different nodes took eight seconds.
+    module = nearest_model(convert)
+    bsdf = module.native_bsdf.Native
+    monkeypatch.setattr(module, "_rough_width", lambda *_: pytest.fail("searched for a width"))
+    for native in (
+        bsdf("principled", GOLD, 0.43, metallic=1.0),
+        bsdf("principled", GOLD, 0.43),
+        bsdf("diffuse", GOLD),
+    ):
+        fit = module.nearest((native,), (), True, lambda model, values: True)
+        assert fit.candidate.is_own and fit.found == ()
+    with pytest.raises(pytest.fail.Exception):
+        module.nearest(
+            (bsdf("principled", GOLD, 0.43, metallic=0.5),), (), False, lambda model, values: True
+        )
+
+
 # ---- what Blender's nodes are taken for ----------------------------------------------------------
 
 UNDER_A_SUN = [

@@ -1608,3 +1608,38 @@ def test_disable_leaves_nothing_behind(extension, empty):
     now = {name: list(getattr(bpy.app.handlers, name)) for name in handlers}
     assert {n: len(f) for n, f in now.items()} == {n: len(f) for n, f in handlers.items()}
     assert all(c.is_registered for c in classes)
+
+
+@pytest.mark.parametrize("ways", ["new_material", "set_parameters", "see_lamps"])
+def test_a_script_that_imports_a_disabled_extension_enables_it(extension, empty, ways, capfd):
+    # Without handlers, a lamp that moves would stay where it was in every material.
+    material = extension.api.new_material("ward")
+    bpy.ops.preferences.addon_disable(module=extension.package)
+    try:
+        if ways == "new_material":
+            extension.api.new_material("phong")
+        elif ways == "set_parameters":
+            extension.api.set_parameters(material, ax=0.3)
+        else:
+            extension.api.see_lamps(empty)
+        assert bpy.types.BRDFC_OT_add_node.is_registered
+        assert "enabled for this session" in capfd.readouterr().out
+        extension.api.new_material("phong")
+        assert "enabled" not in capfd.readouterr().out
+    finally:
+        bpy.ops.preferences.addon_enable(module=extension.package)
+
+
+def test_a_disabled_extension_says_why_it_cant_be_enabled(extension, empty, monkeypatch):
+    def refuse():
+        raise RuntimeError("another is enabled")
+
+    bpy.ops.preferences.addon_disable(module=extension.package)
+    try:
+        with monkeypatch.context() as patch:
+            patch.setattr(import_module(extension.package), "register", refuse)
+            with pytest.raises(RuntimeError, match="can't be enabled: another is enabled"):
+                extension.api.new_material("phong")
+        assert not bpy.data.materials
+    finally:
+        bpy.ops.preferences.addon_enable(module=extension.package)

@@ -2,6 +2,7 @@
 """Tests that nodes of formulas are made once and appended the next time, and that both are the
 same."""
 
+import contextlib
 from importlib import import_module
 from pathlib import Path
 
@@ -102,6 +103,25 @@ def test_what_materials_add_to_a_file(extension, empty, tmp_path):
     first, again, ward, factors = np.diff(sizes)
     print("KB:", *(np.diff(sizes) // 1000))
     assert again < 5e3 and ward < 250e3 and first < 650e3 and factors < 800e3
+
+
+def test_the_cursor_shows_that_nodes_are_built(extension, kept, monkeypatch):
+    part_groups = import_module(f"{extension.package}.content.part_groups")
+    shown, cursor = [], part_groups._wait_cursor
+
+    @contextlib.contextmanager
+    def recorded():
+        with cursor():
+            shown.append("busy")
+            yield
+        shown.append("done")
+
+    monkeypatch.setattr(part_groups, "_wait_cursor", recorded)
+    extension.api.new_material("ward", "nodes")
+    assert shown == ["busy", "done"]
+    new_file()
+    extension.api.new_material("ward", "nodes")  # appended, which takes no time
+    assert shown == ["busy", "done"]
 
 
 @pytest.mark.slow

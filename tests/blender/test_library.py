@@ -82,6 +82,18 @@ def test_a_model_of_which_nothing_is_made_is_there_with_its_defaults(
         library.entries()
 
 
+def test_what_needs_open_shading_language_says_so(extension, library, empty):
+    empty.cycles.shading_system = False
+    found = set()
+    for entry in library.entries():
+        warned = extension.api.warnings(library.make(extension.api, entry), empty)
+        needs = "osl_off" in {warning.code for warning in warned}
+        assert needs == ("Without Open Shading Language" in library.description(entry)), entry.name
+        found |= {entry.name} if needs else set()
+    # Rays through a surface, and a choice of a model that has refraction as another.
+    assert found == {"Frosted Glass", "Sea Glass", "Traffic Sign White"}
+
+
 def test_every_picture_is_of_the_material_that_is_listed(library, monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "script")
     previews = importlib.import_module("asset_previews")
