@@ -6,9 +6,11 @@ Runs in a Python that has `bpy`. Renders a sphere under a sky with each model's 
 All forms of a model take turns in one process, so that other load on the machine affects them
 equally. Several processes are used, because times vary more between processes than within one. The
 cost of a form is the median over all repetitions of its sampling time divided by that of the Glossy
-node. Forms that need a fit come from a pack for these very materials. For aimed forms, and for the
-Glossy node they are compared with, a point lamp is added to the sky: without lamps they would have
-less to compute. Prints CSV; the rows of a model appear as soon as they are measured.
+node. Forms that need a fit come from a pack for these very materials. For aimed forms and Formula
+Nodes, and for the Glossy node they are compared with, a point lamp is added to the sky: without
+lamps they would have less to compute. Formula Nodes and their Glossy node are rendered with Open
+Shading Language off, as in files at default settings. Prints CSV; the rows of a model appear as
+soon as they are measured.
 """
 
 import argparse
@@ -23,8 +25,15 @@ from pathlib import Path
 RENDER_SCENE = Path(__file__).resolve().parents[1] / "script" / "render_scene.py"
 
 
-#: Forms whose scene has a lamp.
-LIT = ("aimed",)
+#: Forms that aim at lamps: their scene has one.
+LIT = ("aimed", "nodes")
+#: Forms that are measured with Open Shading Language off.
+WITHOUT_OSL = ("nodes",)
+
+
+def surroundings(form):
+    """Whether a form's scene has a lamp, and whether Open Shading Language is on."""
+    return form in LIT, form not in WITHOUT_OSL
 
 
 def scene(model, options, lit):
@@ -84,18 +93,20 @@ def measure(options, model, forms, folder):
         source = file.with_name("source.json")
         source.write_text(json.dumps(scene(model, options, lit)), encoding="utf-8")
         subprocess.run([options.tool, "scene", source, "--out", file.parent], check=True)
-    rendered = [("glossy", lit) for lit in (False, True) if any((n in LIT) == lit for n in names)]
-    rendered += [(n, n in LIT) for n in names]
+    of_forms = [surroundings(name) for name in names]
+    rendered = [("glossy", around) for around in dict.fromkeys(sorted(of_forms))]
+    rendered += zip(names, of_forms, strict=True)
     jobs = [
         {
             "name": f"{model} {form}",
             "scene": str(scenes[lit]),
             "out": str(folder / f"{form}.exr"),
             "representation": form,
+            "osl": osl,
             "repeat": options.repeat,
             "pack": str(pack) if form in fitted else None,
         }
-        for form, lit in rendered
+        for form, (lit, osl) in rendered
     ]
     file = folder / "jobs.json"
     file.write_text(json.dumps(jobs), encoding="utf-8")
@@ -107,7 +118,7 @@ def measure(options, model, forms, folder):
             times[key] += [r["sampling_cpu_seconds"] for r in record["repeats"]]
     # The node's own row shows its time under the sky alone, if that was rendered.
     shown = [rendered[0], *(key for key in rendered if key[0] != "glossy")]
-    return {form: (times[form, lit], times["glossy", lit]) for form, lit in shown}
+    return {form: (times[form, around], times["glossy", around]) for form, around in shown}
 
 
 def main():

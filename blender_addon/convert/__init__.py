@@ -5,6 +5,7 @@ Nothing is changed before apply().
 """
 
 from .apply_restore import apply, is_converted, restore
+from .cost import cost
 from .filter_glossy import warning
 from .node_values import KNOWN_SOCKETS, natives
 from .planned_node import LIMIT, Plan
@@ -15,6 +16,7 @@ __all__ = [
     "LIMIT",
     "Plan",
     "apply",
+    "cost",
     "is_converted",
     "natives",
     "plan",

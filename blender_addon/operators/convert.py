@@ -64,8 +64,9 @@ class BRDFC_OT_convert(Operator):
         for made in self._within():
             icon = "ERROR" if made.refusal else "CHECKMARK"
             wrapped(column, made.line(), icon, pixels=560)
-        if said := convert.warning(self._within(), context.scene):
-            wrapped(column, said, "INFO", pixels=560)
+        for told in (convert.cost, convert.warning):
+            if said := told(self._within(), context.scene):
+                wrapped(column, said, "INFO", pixels=560)
 
     def execute(self, context):
         try:
@@ -77,6 +78,8 @@ class BRDFC_OT_convert(Operator):
             return refused(self, error)
         for made in plans:
             self.report({"WARNING" if made.refusal else "INFO"}, rpt(made.line()))
+        if said := convert.cost(plans, context.scene):
+            self.report({"INFO"}, rpt(said))
         if said := convert.warning(plans, context.scene):
             self.report({"WARNING"}, rpt(said))
         done = [node for m in _selected_materials(context) for node in nodes.group_nodes(m)]

@@ -254,7 +254,7 @@ class BRDFC_OT_substance(ChangesActiveMaterial, Operator):
         subtype="FILE_PATH",
         options={"SKIP_SAVE"},
     )
-    filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
+    filter_glob: StringProperty(default="*.csv;*.txt", options={"HIDDEN"})
 
     def invoke(self, context, event):
         if self.substance != _FILE:
@@ -266,8 +266,9 @@ class BRDFC_OT_substance(ChangesActiveMaterial, Operator):
         material = context.object.active_material
         name = bpy.path.abspath(self.filepath) if self.substance == _FILE else self.substance
         try:
-            if self.substance == _FILE and not name.endswith(".csv"):
-                raise ValueError(say("{file}: expected a file NAME.csv", file=repr(name)))
+            if self.substance == _FILE and not name.endswith(optical.ENDINGS):
+                expected = say("{file}: expected a file NAME.csv or NAME.txt", file=repr(name))
+                raise ValueError(expected)
             node = nodes.named(material, self.node) if self.node else None
             stated = self.properties.is_property_set("thickness")
             values = api.set_substance(material, name, node, self.thickness if stated else None)

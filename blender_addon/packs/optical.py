@@ -23,6 +23,8 @@ for _channel, _letter in enumerate("rgb"):
     _ROLES[f"extinction_{_letter}"] = (lambda s, v, c=_channel: v.k[c], None)
 #: The roles that describe absorption inside.
 _INSIDE = ("attenuation", "per_length")
+#: Names of files of n and k.
+ENDINGS = (".csv", ".txt")
 
 
 def can_have(model_name):
@@ -31,16 +33,18 @@ def can_have(model_name):
 
 
 def find(name):
-    """Finds a substance of the extension, or reads a file NAME.csv as refractiveindex.info exports
-    it.
+    """Finds a substance of the extension, or reads a file NAME.csv or NAME.txt as
+    refractiveindex.info exports it.
 
     Raises ValueError that names file, line and what was expected."""
     from ..brdfc import optics  # NumPy's formulas are imported on first use
 
     if not isinstance(name, str | os.PathLike):
-        raise ValueError(f"expected the name of a substance or a file NAME.csv, got {name!r}")
+        raise ValueError(
+            f"expected the name of a substance or a file NAME.csv or NAME.txt, got {name!r}"
+        )
     name = os.fspath(name)
-    if not name.endswith(".csv"):
+    if not name.endswith(ENDINGS):
         return optics.substance(name)
     try:
         return optics.read(name)

@@ -109,6 +109,14 @@ class Cleaner {
   std::vector<std::string>& notes_;
 };
 
+/// A line of the two kinds that refractiveindex.info exports: fields are separated by commas or by tabs.
+std::string with_commas(std::string line) {
+  if (line.find(',') == std::string::npos) std::ranges::replace(line, '\t', ',');
+  return line;
+}
+
+bool is_file(const std::string& name) { return name.ends_with(".csv") || name.ends_with(".txt"); }
+
 }  // namespace
 
 double Curve::at(double wavelength) const {
@@ -163,7 +171,7 @@ Substance read_substance(const fs::path& path) {
       if (comments == 2) out.source = trim(line.substr(1));
       continue;
     }
-    const std::vector<std::string> fields = split_fields(line);
+    const std::vector<std::string> fields = split_fields(with_commas(line));
     if (fields[0] == "wl") {
       block.clear();
       for (std::size_t i = 1; i < fields.size(); ++i) {
@@ -210,13 +218,13 @@ const std::vector<Substance>& substances() {
 }
 
 Substance find_substance(const std::string& name, const fs::path& folder) {
-  if (name.ends_with(".csv")) return read_substance(folder / name);  // an absolute path is not changed
+  if (is_file(name)) return read_substance(folder / name);  // an absolute path is not changed
   std::vector<std::string> known;
   for (const Substance& s : substances()) {
     if (s.name == name) return s;
     known.push_back(s.name);
   }
-  input_error("expected a file NAME.csv or one of {}, got '{}'", fmt::join(known, ", "), name);
+  input_error("expected a file NAME.csv or NAME.txt, or one of {}, got '{}'", fmt::join(known, ", "), name);
 }
 
 OpticalValues optical_values(const Substance& s, const ToRgb& to_rgb) {

@@ -266,10 +266,10 @@ def _header(fields, found, where):
 
 def read(path: str | PathLike[str]) -> Substance:
     """Reads a file as refractiveindex.info exports it: a line wl,n, rows of a wavelength in
-    micrometres and n, then the same of wl,k, which may be missing; or wl,n,k. Lines that start with
-    # are skipped; the first is the label, the second the source. Wavelengths of 100 and more are
-    nanometres; rows may come in any order, and of a wavelength that stands twice the mean is taken.
-    What was assumed is said in `notes`.
+    micrometres and n, then the same of wl,k, which may be missing; or wl,n,k; with commas or tabs.
+    Lines that start with # are skipped; the first is the label, the second the source. Wavelengths
+    of 100 and more are nanometres; rows may come in any order, and of a wavelength that stands
+    twice the mean is taken. What was assumed is said in `notes`.
 
     Raises OSError, and ValueError naming file, line and what was expected.
     """
@@ -284,7 +284,8 @@ def read(path: str | PathLike[str]) -> Substance:
         if line.startswith("#"):
             comments.append(line[1:].strip(" \t\r"))
             continue
-        fields = [f.strip(" \t\r") for f in line.split(",")]
+        separator = "," if "," in line else "\t"
+        fields = [f.strip(" \t\r") for f in line.split(separator)]
         if fields[0] == "wl":
             block = _header(fields, found, where)
         if not block:

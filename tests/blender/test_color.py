@@ -242,7 +242,7 @@ def test_the_button_sets_a_metal(extension, empty, tmp_path):
     grey = (0.25 + 9) / (2.25 + 9)
     assert extension.api.get_parameters(material)["ks"] == pytest.approx([grey] * 3, abs=2e-4)
     with pytest.raises(RuntimeError, match="expected a file NAME.csv"):
-        bpy.ops.brdfc.substance(substance="FILE", filepath=str(tmp_path / "own.txt"))
+        bpy.ops.brdfc.substance(substance="FILE", filepath=str(tmp_path / "own.dat"))
 
 
 def test_the_screens_curve_is_srgb_and_luminance_is_that_of_the_space(extension, empty, color):

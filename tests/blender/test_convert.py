@@ -1364,7 +1364,34 @@ def test_a_limit_that_is_changed_afterwards_plans_anew(extension, item):
     operator.draw(last, bpy.context)
     assert last.layout.log == ["value : 0.5"]
     assert operator.execute(last, bpy.context) == {"FINISHED"}
-    assert ["stays" in line for line in said] == [False, False, False, True]
+    rows = [line for line in said if ": " in line]
+    assert ["stays" in line for line in rows] == [False, False, False, True]
+
+
+@pytest.mark.parametrize("osl", [True, False])
+def test_the_dialog_says_what_the_new_nodes_cost(extension, convert, item, osl):
+    scene = bpy.context.scene
+    scene.cycles.shading_system = osl
+
+    def of(name):
+        return extension.pack.model(name).automatic(osl=osl).entry["cost"]
+
+    plans = convert.plan([bpy.data.materials[kind] for kind in ("diffuse", "principled")])
+    assert [[part.model for part in plan.parts] for plan in plans] == [
+        ["lambert"],
+        ["microfacet", "lambert"],
+    ]
+    low, high = of("lambert"), of("microfacet") + of("lambert") - 1
+    assert 0.9 < low < high < 4
+    said = f"about {low:.1f} to {high:.1f} times as long as a Glossy node"
+    assert said in convert.cost(plans, scene)
+    assert f"about {low:.1f} times" in convert.cost(plans[:1], scene)
+    layout = helpers.Layout()
+    operator = import_module(f"{extension.package}.operators.convert").BRDFC_OT_convert
+    operator.draw(SimpleNamespace(layout=layout, _within=lambda: plans), bpy.context)
+    assert said in " ".join(layout.log)
+    scene.render.engine = "BLENDER_WORKBENCH"  # renders no models
+    assert convert.cost(plans, scene) is None
 
 
 def test_nothing_to_convert(extension, item):

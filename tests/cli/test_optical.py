@@ -278,6 +278,7 @@ ODD = {
         "wavelengths of 100 and more are taken for nanometres",
     ),
     GOOD + "1.2,1.42,0.004\n1.4,1.4,0\n": ("1 wavelength of n stands twice", "1 wavelength of k"),
+    GOOD.replace(",", "\t"): (),
     "wl,n,k\n" + "\n".join(reversed(GOOD.split("\n")[1:-1])): (),
     GOOD + "2,1.4,-1.6e-9\n": ("1 value of k is below 0, the least -1.6e-09: taken for 0",),
     GOOD + "20,1.4,180\n": ("1 value of k outside of [0, 100] and of the visible: left out",),
@@ -294,7 +295,7 @@ ODD = {
 def test_what_files_of_others_have_is_assumed_and_said(tmp_path, optics, text):
     """Visible wavelengths are not affected by the variation; the tool and the package report the
     same."""
-    file = tmp_path / "odd.csv"
+    file = tmp_path / ("odd.txt" if "\t" in text else "odd.csv")
     file.write_text(GOOD, encoding="utf-8")
     plain = optical(file)
     file.write_text(text, encoding="utf-8")
@@ -346,7 +347,9 @@ def test_what_is_wrong_in_a_file_is_said(tmp_path, optics, text):
 
 
 def test_names_that_there_are_not_are_errors(tmp_path, optics):
-    for name, expected in (("unobtainium", "expected a file NAME.csv or one of aluminium"),):
+    for name, expected in (
+        ("unobtainium", "expected a file NAME.csv or NAME.txt, or one of aluminium"),
+    ):
         done = run("optical", name)
         assert done.returncode == 2 and expected in done.stderr and name in done.stderr
     done = run("optical", tmp_path / "none.csv")
@@ -382,7 +385,10 @@ def test_a_scene_names_a_substance_or_a_file(tmp_path):
     assert found["b"]["parameters"]["dispersion"] == pytest.approx(20 / flint["abbe"])
     assert flint["abbe"] == pytest.approx(25.68, abs=0.05), "as the maker's catalogue has it"
     for change, expected in (
-        ({"optical": "mithril"}, "materials.a.optical: expected a file NAME.csv or one of"),
+        (
+            {"optical": "mithril"},
+            "materials.a.optical: expected a file NAME.csv or NAME.txt, or one of",
+        ),
         ({"optical": "none.csv"}, "materials.a.optical: "),
         ({"parameters": {"n_r": 1}}, 'n_r: "optical" says what it is'),
         ({"model": "glass"}, "glass has no parameter that says which metal"),
