@@ -454,7 +454,7 @@ def scripts_of(node):
 def test_shaders_are_short_but_for_outputs_that_were_asked_for(extension, made_forms, subtests):
     """A file contains source and bytecode of each shader. Fits contain their own tables; two aimed
     forms still contain too much for each of their many choices."""
-    longer = {("ashikhmin_shirley", "aimed"): 160_000, ("radziszewski_alda", "aimed"): 200_000}
+    longer = {("ashikhmin_shirley", "aimed"): 161_000, ("radziszewski_alda", "aimed"): 200_000}
     for model, form, material in made_forms:
         with subtests.test(model=model, form=form):
             source = extension.pack.model(model).forms[form].source()[1]

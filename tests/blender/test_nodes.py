@@ -51,6 +51,7 @@ def test_a_sun_without_an_angle(extension, empty, tool, few_of, towards):
 CASES = [
     ("ashikhmin_shirley", {}),
     ("ward", {"ax": 0.3, "ay": 0.1}),
+    pytest.param("charlie", {"r": 0.2, "terminator": "soft"}, marks=SLOW),
     pytest.param("cook_torrance", {}, marks=SLOW),
     pytest.param("coupled", {}, marks=SLOW),
     pytest.param("lafortune", {}, marks=SLOW),

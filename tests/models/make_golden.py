@@ -12,6 +12,7 @@ by changing each input by half a unit in the last place), times a small factor, 
 
 import csv
 import functools
+import itertools
 import math
 import random
 import sys
@@ -1099,6 +1100,82 @@ def oren_nayar_albedo(p, cos_o):
     return [r * direct + r * r * again for r in p["rho"]]
 
 
+# ---- Charlie: Estevez and Kulla, 2017 ----------------------------------------------------------
+
+CHARLIE = [
+    ("25.3245", "21.5473"),
+    ("3.32435", "3.82987"),
+    ("0.16801", "0.19823"),
+    ("-1.27393", "-1.97760"),
+    ("-4.85967", "-4.32054"),
+]
+
+
+def charlie_lambda(r, c, lib):
+    w = (1 - r) ** 2
+    k = [w * lib.mpf(at_0) + (1 - w) * lib.mpf(at_1) for at_0, at_1 in CHARLIE]
+
+    def fitted(x):
+        return k[0] / (1 + k[1] * x ** k[2]) + k[3] * x + k[4]
+
+    half = lib.mpf(1) / 2
+    return lib.exp(fitted(c) if c < half else 2 * fitted(half) - fitted(1 - c))
+
+
+def charlie_value(p, ci, co, sin2, lib):
+    r = lib.mpf(p["r"])
+    d = (2 + 1 / r) * lib.sqrt(sin2) ** (1 / r) / (2 * lib.pi)
+    li, lo = charlie_lambda(r, ci, lib), charlie_lambda(r, co, lib)
+    if p["terminator"] == "soft":
+        li = li ** (1 + 2 * (1 - ci) ** 8)
+    return d / (1 + li + lo) / (4 * ci * co)
+
+
+def charlie_f(p, wi, wo):
+    k1, k2, h = as_half(wi, wo)
+    f = charlie_value(p, k1[2], k2[2], h[0] ** 2 + h[1] ** 2, mp)
+    return [c * f for c in p["tint"]]
+
+
+def charlie_back(p, wo):
+    """What samples have as their density's power, and the horizontal direction to the viewer."""
+    s = mp.sqrt(wo[0] ** 2 + wo[1] ** 2)
+    r = mp.mpf(p["r"])
+    return s * (mp.mpf(1) / 2 - r / 4 + mp.mpf("0.4") * wo[2] / r), s
+
+
+def charlie_pdf(p, wi, wo):
+    wi, wo = vec(wi), vec(wo)
+    n, s = charlie_back(p, wo)
+    most, least = mp.mpf("2.2"), mp.mpf("0.2")
+    x = (wi[0] * wo[0] + wi[1] * wo[1]) / s
+    return (n + 1) * (x + most - 1) ** n / (most ** (n + 1) - least ** (n + 1)) / mp.pi
+
+
+def ends(n=60):
+    """Nodes within 0 and 1 for integrands that are singular there: tanh-sinh quadrature."""
+    h = 3.2 / n
+    t = np.arange(-n, n + 1) * h
+    x = 1 / (1 + np.exp(-np.pi * np.sinh(t)))
+    return x, h * np.pi * np.cosh(t) * x * (1 - x)
+
+
+def charlie_albedo(p, cos_o):
+    """Integrated over the polar angle's cosine and the azimuth. D has an edge in the mirror
+    direction, L is steep at the horizon and at the normal."""
+    total, so = 0.0, math.sqrt(1 - cos_o**2)
+    nodes, weights = ends()
+    edges = sorted({0, cos_o, 0.5, 1})
+    for low, high in itertools.pairwise(edges):
+        for x, w in zip(low + (high - low) * nodes, (high - low) * weights, strict=True):
+            for y, v in zip(nodes, weights, strict=True):
+                s = math.sqrt(1 - x * x) * so * math.cos(math.pi * y)
+                hz2 = (x + cos_o) ** 2 / (2 * (1 + s + x * cos_o))
+                f = charlie_value(p, mp.fp.mpf(x), mp.fp.mpf(cos_o), max(1 - hz2, 0.0), mp.fp)
+                total += w * v * 2 * math.pi * x * f
+    return [c * total for c in p["tint"]]
+
+
 # ---- EON: Portsmouth, Kutz and Hill, 2025 ------------------------------------------------------
 
 
@@ -1565,6 +1642,20 @@ MODELS = {
             {"sigma": 1e-4},
             {"form": "qualitative"},
             {"form": "qualitative", "sigma": 0.6},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
+    "charlie": dict(
+        f=charlie_f,
+        pdf=charlie_pdf,
+        albedo=charlie_albedo,
+        defaults={"tint": (0.8, 0.8, 0.8), "r": 0.3, "terminator": "plain"},
+        cases=[
+            {},
+            {"r": 0.1, "tint": (1, 0.5, 0.1)},
+            {"r": 1},
+            {"terminator": "soft"},
+            {"r": 0.1, "terminator": "soft"},
         ],
         cosines=[1, 0.5, 0.1],
     ),
