@@ -79,7 +79,6 @@ class Problem {
     Colors f;
     double best = std::numeric_limits<double>::infinity();
     std::vector<Rgb<double>> best_found = found;
-    // f is linear in most colours, and then the second round changes nothing.
     for (int round = 0; round < (n ? 3 : 1); ++round) {
       for (std::size_t j = 0; j < n; ++j) set(*colors_[j], round == 0 ? Rgb<double>(0) : found[j]);
       const std::vector<Rgb<double>> base = round == 0 ? std::vector<Rgb<double>>(n, Rgb<double>(0)) : found;
@@ -97,6 +96,7 @@ class Problem {
         steps.push_back(end - base[j]);
         set(*colors_[j], base[j]);
       }
+      Colors linear(count);  // f, if it is linear in the colours
       for (std::size_t c = 0; c < 3; ++c) {
         Eigen::MatrixXd columns(count, all);
         Eigen::VectorXd target(count);
@@ -114,9 +114,15 @@ class Problem {
             least_deviations(columns, target, p.weight, mean, Eigen::VectorXd::Ones(Eigen::Index(all)));
         for (std::size_t j = 0; j < n; ++j) set_channel(found[j], c, x[Eigen::Index(j)]);
         if (matte) set_channel(added, c, x[Eigen::Index(n)]);
+        for (std::size_t k = 0; k < count; ++k)
+          set_channel(linear[k], c,
+                      channel(p.data[k], c) - target[Eigen::Index(k)] +
+                          columns.row(Eigen::Index(k)).head(Eigen::Index(n)).dot(x.head(Eigen::Index(n))));
       }
       for (std::size_t j = 0; j < n; ++j) set(*colors_[j], found[j]);
       f = eval(p);
+      // As it is in most: another round would find the same colours.
+      const bool settled = !differ(f, linear, 1e-9);
       if (matte)
         for (Rgb<double>& v : f) v += added / kPi;
       const double error = error_of(p, f);
@@ -124,6 +130,7 @@ class Problem {
       best = error;
       best_found = found;
       if (matte) matte = added;
+      if (settled) break;
     }
     for (std::size_t j = 0; j < n; ++j) set(*colors_[j], best_found[j]);
     return std::isfinite(best) ? best : std::numeric_limits<double>::infinity();
@@ -158,13 +165,13 @@ class Problem {
     brdf_->assign(p.name, {value.r, value.g, value.b});
   }
 
-  static bool differ(const Colors& a, const Colors& b) {
+  static bool differ(const Colors& a, const Colors& b, double share = 1e-6) {
     double off = 0, most = 0;
     for (std::size_t k = 0; k < a.size(); ++k) {
       off = std::max(off, max_component(magnitude(a[k] - b[k])));
       most = std::max(most, max_component(magnitude(a[k])));
     }
-    return off > 1e-6 * most;
+    return off > share * most;
   }
 
   /// Whether f depends on a number, with the others at their defaults or elsewhere.

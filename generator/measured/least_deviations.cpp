@@ -12,6 +12,7 @@ namespace {
 constexpr double kFloorFalls = 5e-6;
 constexpr int kSweeps = 400, kBetweenSteps = 8;
 constexpr double kSettled = 1e-12;
+constexpr Eigen::Index kFewColumns = 4;
 
 /// Solves the normal equations for those x that are within their bounds, and goes as far towards the solution as the
 /// bounds allow.
@@ -43,13 +44,10 @@ void step_inside(const Eigen::MatrixXd& normal, const Eigen::VectorXd& right, co
   }
 }
 
-/// The x in [0, high] that minimise the sum of weight (target - columns x)^2: descent along one after another finds
-/// which are at their bounds, and now and then the others are solved for.
-void least_squares(const Eigen::MatrixXd& columns, const Eigen::VectorXd& target, const Eigen::VectorXd& weight,
-                   const Eigen::VectorXd& high, Eigen::VectorXd& x) {
-  const Eigen::MatrixXd weighted = weight.asDiagonal() * columns;
-  const Eigen::MatrixXd normal = columns.transpose() * weighted;
-  const Eigen::VectorXd right = weighted.transpose() * target;
+/// The x in [0, high] that solve the normal equations of least squares: descent along one after another finds which are
+/// at their bounds, and now and then the others are solved for.
+void least_squares(const Eigen::MatrixXd& normal, const Eigen::VectorXd& right, const Eigen::VectorXd& high,
+                   Eigen::VectorXd& x) {
   for (int sweep = 0; sweep < (x.size() > 1 ? kSweeps : 1); ++sweep) {
     if (sweep % kBetweenSteps == 1) step_inside(normal, right, high, x);
     double moved = 0;
@@ -70,9 +68,32 @@ Eigen::VectorXd least_deviations(const Eigen::MatrixXd& columns, const Eigen::Ve
   Eigen::VectorXd x = Eigen::VectorXd::Zero(columns.cols());
   double floor = scale;
   const double falls = std::pow(kFloorFalls, 1. / rounds);
+  const Eigen::Index n = columns.cols();
+  // Of few columns the products are kept, so that a round takes a dot product for each of them.
+  const bool few = n <= kFewColumns;
+  Eigen::MatrixXd products(columns.rows(), few ? n * (n + 1) / 2 + n : 0);
+  if (few)
+    for (Eigen::Index i = 0, k = 0; i < n; ++i) {
+      for (Eigen::Index j = 0; j <= i; ++j) products.col(k++) = columns.col(i).cwiseProduct(columns.col(j));
+      products.col(k++) = columns.col(i).cwiseProduct(target);
+    }
+  Eigen::MatrixXd normal(n, n);
+  Eigen::VectorXd right(n), rest(columns.rows()), weights(columns.rows());
   for (int round = 0; round < rounds; ++round, floor *= falls) {
-    const Eigen::VectorXd rest = (target - columns * x).cwiseAbs();
-    least_squares(columns, target, weight.array() / (rest.array() + floor + 1e-30), high, x);
+    rest = target;
+    for (Eigen::Index i = 0; i < n; ++i) rest -= x[i] * columns.col(i);
+    weights = weight.array() / (rest.array().abs() + floor + 1e-30);
+    if (few) {
+      for (Eigen::Index i = 0, k = 0; i < n; ++i) {
+        for (Eigen::Index j = 0; j <= i; ++j) normal(i, j) = normal(j, i) = products.col(k++).dot(weights);
+        right[i] = products.col(k++).dot(weights);
+      }
+    } else {
+      const Eigen::MatrixXd weighted = weights.asDiagonal() * columns;
+      normal = columns.transpose() * weighted;
+      right = weighted.transpose() * target;
+    }
+    least_squares(normal, right, high, x);
   }
   return x;
 }

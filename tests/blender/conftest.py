@@ -141,7 +141,8 @@ def batch():
 @pytest.fixture
 def empty(extension):
     """An empty factory file with Cycles and, unlike a new file of a user, with Open Shading
-    Language on. Preferences, including the extension, stay."""
+    Language on and without denoising, which takes longer than most pictures of tests, and hides
+    what they show. Preferences, including the extension, stay."""
     import bpy
 
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
@@ -149,7 +150,7 @@ def empty(extension):
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU"
-    scene.cycles.shading_system = True
+    scene.cycles.shading_system, scene.cycles.use_denoising = True, False
     return scene
 
 

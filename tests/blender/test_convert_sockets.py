@@ -27,6 +27,9 @@ COLORS = ((0.8, 0.3, 0.1, 1.0), (0.02, 0.05, 0.1, 1.0))
 VECTORS = ((0.3, -0.8, 0.5),)
 #: Inputs of effects that are off in these states. They are set in one state alone.
 EFFECTS = ("Subsurface ", "Coat ", "Sheen ", "Thin Film ")
+#: States in which most inputs count, so most materials differ after conversion. Open Shading
+#: Language compiles each of them, which takes two thirds of the test's time.
+MANY = ("plastic", "polished plastic", "metal", "glowing")
 #: Pixels across a ball with its margin, samples of each, and balls in a row of a picture.
 PIXELS, SAMPLES, ROW = 16, 64, 12
 
@@ -145,7 +148,10 @@ def shown_by(socket):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("state", STATES)
+@pytest.mark.parametrize(
+    "state",
+    [pytest.param(s, marks=pytest.mark.long) if s in MANY else s for s in STATES],
+)
 def test_a_picture_is_as_before_whatever_is_set(extension, convert, empty, state):
     """Converted materials that are the same are shown once."""
     # Where an alpha chooses among paths of a glass, there is more noise.
