@@ -22,7 +22,7 @@ from . import convert, lamps, lean, library, measured
 from .common import argument_checks, editable, enabling, files
 from .common.i18n import say
 from .content.compiler import CompileError
-from .groups import automatic, bump_correction, nodes, update, usage
+from .groups import automatic, bump_correction, model_nodes, nodes, update, usage
 from .groups.update import Update
 from .lamps import Lamp
 from .lean import PlanError
@@ -132,7 +132,7 @@ def new_material(model, representation="auto", **parameters):
         tree = nodes.empty_tree(material)
         node = nodes.add_group_node(tree, model, representation, values)
         for name, value in values.items():
-            nodes.set_value(node, name, value)
+            model_nodes.set_value(node, name, value)
         output = tree.nodes.new("ShaderNodeOutputMaterial")
         output.location = (300, 0)
         tree.links.new(node.outputs["BSDF"], output.inputs["Surface"])
@@ -224,7 +224,7 @@ def new_sum(lobes, representation="auto", name="Sum"):
             form = "auto" if representation == "auto" else form
             added.append(nodes.add_group_node(tree, model, form, values))
             for parameter, value in values.items():
-                nodes.set_value(added[-1], parameter, value)
+                model_nodes.set_value(added[-1], parameter, value)
         measured.add_shaders(tree, node, added)
         prepare_material(material)
     except BaseException:
@@ -238,8 +238,8 @@ def _the_node(material, node=None):
     """A model node of a material: its only one, or the one that `node` is or names."""
     argument_checks.material(material)
     if isinstance(node, str):
-        return nodes.named(material, node)
-    ours = nodes.group_nodes(material)
+        return model_nodes.named(material, node)
+    ours = model_nodes.group_nodes(material)
     if node is not None and argument_checks.node(node) in ours:
         return node
     if node is None and len(ours) == 1:
@@ -257,7 +257,7 @@ def _the_node(material, node=None):
         say(
             "Material {material!r} has {count} reflection models: expected node=, one of {names}",
             **of,
-            names=", ".join(repr(nodes.key(n)) for n in ours),
+            names=", ".join(repr(model_nodes.key(n)) for n in ours),
         )
     )
 
@@ -275,26 +275,26 @@ def set_parameters(material, node=None, **parameters):
 def _set(node, what, parameters):
     enabling.enable()
     editable.check(node.id_data)
-    model, representation = nodes.identity(node).model, nodes.form_in_script(node)
-    lean_node = nodes.is_baked(node)
+    model, representation = model_nodes.identity(node).model, model_nodes.form_in_script(node)
+    lean_node = model_nodes.is_baked(node)
     _, values = _checked(model, "auto" if lean_node else representation, parameters)
-    present = nodes.sockets(node)
+    present = model_nodes.sockets(node)
     for name, value in values.items():
         if (
             lean_node
             and name not in present
-            and not equal_in_float32(value, nodes.get_value(node, name))
+            and not equal_in_float32(value, model_nodes.get_value(node, name))
         ):
             raise ValueError(
-                f"{name!r} of {what} is {nodes.get_value(node, name)!r}, the only value of a lean "
-                f"material; switch_representation() brings the others back; got {value!r}"
+                f"{name!r} of {what} is {model_nodes.get_value(node, name)!r}, the only value of a "
+                f"lean material; switch_representation() brings the others back; got {value!r}"
             )
         if name in present and shader_trees.is_driven(present[name]):
             raise ValueError(
                 say("{parameter!r} of {what} is controlled by a link", parameter=name, what=what)
             )
     for name, value in values.items():
-        nodes.set_value(node, name, value)
+        model_nodes.set_value(node, name, value)
 
 
 def set_kernel(group, curve):
@@ -304,8 +304,8 @@ def set_kernel(group, curve):
     largest. Raises ValueError for a node of another model, and where a height is not positive or
     too small beside the largest; in that case nothing is changed.
     """
-    is_ours = nodes.is_ours(argument_checks.node(group))
-    if not is_ours or nodes.identity(group).model != kernel.MODEL:
+    is_ours = model_nodes.is_ours(argument_checks.node(group))
+    if not is_ours or model_nodes.identity(group).model != kernel.MODEL:
         raise ValueError(
             say(
                 "Node {node!r}: expected a node of the model {model!r}",
@@ -336,7 +336,7 @@ def set_substance(material, substance, node=None, thickness=None):
 
     node = _the_node(material, node)
     found = optical.find(substance)
-    values = optical.parameters(nodes.identity(node).model, found, thickness)
+    values = optical.parameters(model_nodes.identity(node).model, found, thickness)
     for note in found.notes:
         print(f"brdfc: {note}")
     _set(node, say("material {name!r}", name=material.name), values)
@@ -354,8 +354,8 @@ def get_parameters(material, node=None):
     """The parameter values of a material with one model, or of the one that `node` names, except
     those that a link controls."""
     node = _the_node(material, node)
-    model_name, _ = nodes.identity(node)
-    values = {name: nodes.get_value(node, name) for name in pack.model(model_name).parameters}
+    model_name, _ = model_nodes.identity(node)
+    values = {name: model_nodes.get_value(node, name) for name in pack.model(model_name).parameters}
     return {name: value for name, value in values.items() if value is not None}
 
 
@@ -363,17 +363,17 @@ def switch_representation(material, representation, node=None):
     """Changes the form of the models of a material, or of the one that `node` names; values and
     links stay. Raises ValueError, with all models as they were, if one of them lacks the form."""
     argument_checks.material(material)
-    several = node is None and len(nodes.group_nodes(material)) > 1
-    chosen = nodes.group_nodes(material) if several else [_the_node(material, node)]
+    several = node is None and len(model_nodes.group_nodes(material)) > 1
+    chosen = model_nodes.group_nodes(material) if several else [_the_node(material, node)]
     for one in chosen:
         editable.check(one.id_data)
         if representation != "auto":
-            model = pack.model(nodes.identity(one).model)
-            model.resolve(representation, nodes.constants(one))
+            model = pack.model(model_nodes.identity(one).model)
+            model.resolve(representation, model_nodes.constants(one))
     for one in chosen:
         nodes.switch(one, representation)
     for tree in dict.fromkeys(one.id_data for one in chosen):
-        for user in nodes.users_of(tree):
+        for user in model_nodes.users_of(tree):
             prepare_material(user)
 
 
@@ -635,6 +635,6 @@ def make_local(material):
     lamps.follow()
     automatic.follow()
     nodes.merge_duplicates(
-        nodes.with_parts({node.node_tree for node in nodes.group_nodes(material)})
+        nodes.with_parts({node.node_tree for node in model_nodes.group_nodes(material)})
     )
     return material

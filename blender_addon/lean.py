@@ -16,7 +16,7 @@ from . import lamps
 from .common.i18n import say
 from .common.jobs import Job
 from .common.program import ToolJob, find
-from .groups import nodes, usage
+from .groups import model_nodes, nodes, usage
 from .packs import pack
 
 #: Forms that a budget never chooses; users can still ask for them.
@@ -203,19 +203,19 @@ class Baking(Job):
     def _work(self):
         """Makes one group per step, then puts all of them into their nodes at once."""
         before, groups = pack.manifest(), {}
-        albedo = {name: nodes.uses_albedo(node) for name, node in self._plan.nodes().items()}
+        albedo = {name: model_nodes.uses_albedo(node) for name, node in self._plan.nodes().items()}
         for name, entry in self._plan.materials.items():
             groups[name] = self._group(entry, albedo[name], before)
             yield len(groups) / len(albedo)
         found = self._plan.nodes()  # the file may have changed meanwhile
         for name, node in found.items():
-            if (has := nodes.uses_albedo(node)) != albedo[name]:
+            if (has := model_nodes.uses_albedo(node)) != albedo[name]:
                 groups[name] = self._group(self._plan.materials[name], has, before)
         for name, node in found.items():
             nodes.replace_group(node, groups[name])
         nodes.remove_unused_groups()
         self._afterwards()
-        self.result = sum(map(nodes.is_baked, dict.fromkeys(found.values())))
+        self.result = sum(map(model_nodes.is_baked, dict.fromkeys(found.values())))
 
     def _group(self, entry, albedo, before):
         with _taken(self._plan.pack):

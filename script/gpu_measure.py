@@ -96,7 +96,7 @@ def install(folder):
     )
     from scene_loader import SceneLoader
 
-    modules = {n: import_module(f"{PACKAGE}.{n}") for n in ("api", "groups.nodes", "packs.pack")}
+    modules = {n: import_module(f"{PACKAGE}.{n}") for n in ("api", "packs.pack")}
     return {n.split(".")[-1]: module for n, module in modules.items()} | {
         "scene_loader": SceneLoader(PACKAGE)
     }

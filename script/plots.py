@@ -39,12 +39,12 @@ def drawing_time(draw):
 def main(extension, out):
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as resources:
         bpy, loader = render_scene.start_blender(extension, resources)
-        api, nodes, panel = (
-            loader.module(name) for name in ("api", "groups.nodes", "panels.plot_panel")
+        api, model_nodes, panel = (
+            loader.module(name) for name in ("api", "groups.model_nodes", "panels.plot_panel")
         )
 
         def node_of(model, form):
-            (node,) = nodes.group_nodes(api.new_material(model, form))
+            (node,) = model_nodes.group_nodes(api.new_material(model, form))
             return node
 
         pictures = [panel.drawn(node_of(*material))[0] for material in MATERIALS.items()]
@@ -57,7 +57,7 @@ def main(extension, out):
         for model, entry in api.models().items():
             for form in ("auto", *entry["representations"]):
                 node = node_of(model, form)
-                if form == "auto" or nodes.is_fitted(node):
+                if form == "auto" or model_nodes.is_fitted(node):
                     taken = drawing_time(lambda node=node: panel.drawn(node))
                     print(f"{model} ({form}): {1000 * taken:.1f} ms")
 

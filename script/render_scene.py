@@ -177,13 +177,13 @@ def render_once(bpy, loader, job, repetition, threads=None):
 
 def describe(bpy, loader, scene, job, samples):
     """What was rendered, and with which settings."""
-    api, nodes, pack = loader.api, loader.nodes, loader.pack
+    api, model_nodes, pack = loader.api, loader.model_nodes, loader.pack
     materials, warnings = {}, []
     used = {s.material for o in scene.objects for s in o.material_slots if s.material}
     for material in sorted(used, key=lambda m: m.name):
         forms = []
-        for node in nodes.group_nodes(material):
-            model, representation = nodes.identity(node)
+        for node in model_nodes.group_nodes(material):
+            model, representation = model_nodes.identity(node)
             entry = pack.model(model).forms[representation].entry
             keep = ("closures", "slots", "operations", "error", "warnings")
             forms.append(

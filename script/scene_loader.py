@@ -60,6 +60,7 @@ class SceneLoader:
         self.color = self.module("common.color")
         self.automatic = self.module("groups.automatic")
         self.nodes = self.module("groups.nodes")
+        self.model_nodes = self.module("groups.model_nodes")
         self.pack = self.module("packs.pack")
         self.parameter_values = self.module("packs.parameter_values")
 

@@ -125,33 +125,48 @@ def _lamp_group(parts):
     return make_group(f"{parts.title}: lamp", content, inputs, [["BSDF", "SHADER"]], fill)
 
 
-def _same_plane(w, lamp, other):
-    """1 for two flat lamps that lie beside each other in one plane, so that neither can hide the
-    other, otherwise 0."""
-    same = w.math("COMPARE", lamp["plane"], other["plane"], 0.5)
-    return w.math("MULTIPLY", same, w.math("GREATER_THAN", lamp["plane"], 0.5))
+def _pair_group():
+    """The group that computes the angle between two lamps, as far as they can be in each other's
+    way: not if the later one is not in use, or both lie beside each other in one plane."""
+
+    def fill(w, found):
+        same = w.math("COMPARE", found["plane"], found["other_plane"], 0.5)
+        same = w.math("MULTIPLY", same, w.math("GREATER_THAN", found["plane"], 0.5))
+        angle = w.vector("DISTANCE", found["towards"], found["other_towards"], output="Value")
+        return {"angle": w.mix(found["used"], _FAR, w.mix(same, angle, _FAR))}
+
+    inputs = [["towards", "VECTOR"], ["other_towards", "VECTOR"]]
+    inputs += [[name, "FLOAT"] for name in ("plane", "other_plane", "used")]
+    return make_group("lamp pair", ["lamp pair"], inputs, [["angle", "FLOAT"]], fill)
 
 
-class _Later:
-    """The later lamps, as seen along a lamp's axis: direction, radius and room of the nearest ball
-    or sun, and the room that all others leave. Flat lamps are not told apart from each other, which
-    would need more numbers than SVM can keep for eight of them."""
+#: The later lamps, as seen along a lamp's axis: room, direction and radius of the nearest ball or
+#: sun, and the room that all others leave; with the values for no lamps. Flat lamps are not told
+#: apart from each other, which would need more numbers than SVM can keep for eight of them.
+_LATER = {"room": _FAR, "others": _FAR, "nearest": (0.0, 0.0, 0.0), "radius": 0.0}
 
-    def __init__(self, w):
-        self.w, self.room, self.others = w, _FAR, _FAR
-        self.towards, self.radius = (0.0, 0.0, 0.0), 0.0
 
-    def add(self, beside, lamp):
-        w = self.w
-        of_flat = w.mix(lamp["flat"], _FAR, beside)
-        beside = w.mix(lamp["flat"], beside, _FAR)
-        closer = w.math("LESS_THAN", beside, self.room)
-        second = w.math("MAXIMUM", beside, self.room)
-        for room in (of_flat, second):
-            self.others = w.math("MINIMUM", self.others, room)
-        self.towards = w.mix(closer, self.towards, lamp["towards"], True)
-        self.radius = w.mix(closer, self.radius, lamp["as_other"])
-        self.room = w.math("MINIMUM", self.room, beside)
+def _later_group():
+    """The group that adds a lamp to _LATER. In a tree with all lamps, each of its nodes would take
+    Blender ten times as long to add."""
+
+    def fill(w, found):
+        beside = w.math("SUBTRACT", found["angle"], found["taken"])
+        of_flat = w.mix(found["flat"], _FAR, beside)
+        beside = w.mix(found["flat"], beside, _FAR)
+        closer = w.math("LESS_THAN", beside, found["room"])
+        others = w.math("MINIMUM", found["others"], of_flat)
+        return {
+            "room": w.math("MINIMUM", found["room"], beside),
+            "others": w.math("MINIMUM", others, w.math("MAXIMUM", beside, found["room"])),
+            "nearest": w.mix(closer, found["nearest"], found["towards"], True),
+            "radius": w.mix(closer, found["radius"], found["as_other"]),
+        }
+
+    state = [[name, "VECTOR" if name == "nearest" else "FLOAT"] for name in _LATER]
+    inputs = [[name, "FLOAT"] for name in ("angle", "taken", "flat", "as_other")]
+    inputs += [["towards", "VECTOR"], *state]
+    return make_group("lamp later", ["lamp later", _FAR], inputs, state, fill)
 
 
 #: What changes where a lamp has a cone beside another lamp. Only so many lamps can have that, from
@@ -205,18 +220,17 @@ def _decide(w, parts, lamps, at, widest):
     """
     for lamp in lamps:
         lamp["taken"] = w.mix(lamp["active"], -_FAR, lamp["reach"])
-    apart = {}
+    pair, step, angles = _pair_group(), _later_group(), {}
     for i, lamp in enumerate(lamps):
         for j, other in enumerate(lamps[i + 1 :], i + 1):
-            distance = w.vector("DISTANCE", lamp["towards"], other["towards"], output="Value")
-            distance = w.mix(_same_plane(w, lamp, other), distance, _FAR)
-            apart[i, j] = apart[j, i] = w.mix(other["used"], _FAR, distance)
+            of_other = {f"other_{name}": other[name] for name in ("towards", "plane")}
+            given = lamp | of_other | {"used": other["used"]}
+            angles[i, j] = angles[j, i] = add_group(w, pair, given, "")["angle"]
     for i, lamp in reversed(list(enumerate(lamps))):
-        later = _Later(w)
+        later = _LATER
         for j in range(len(lamps) - 1, i, -1):
-            beside = w.math("SUBTRACT", apart[i, j], lamps[j]["taken"])
-            later.add(beside, lamps[j])
-        room = w.math("MINIMUM", later.room, later.others)
+            later = add_group(w, step, lamps[j] | later | {"angle": angles[i, j]}, "")
+        room = w.math("MINIMUM", later["room"], later["others"])
         free = w.math("LESS_THAN", lamp["reach"], room)
         if i < _MOST_ASIDE:
             free = w.math("MAXIMUM", free, _move_aside(w, parts, lamp, at, later))
@@ -227,7 +241,7 @@ def _decide(w, parts, lamps, at, widest):
         lamp["as_other"] = w.mix(shown, _FAR, lamp["reach"])
         room = w.math("MINIMUM", room, widest)
         for j in range(i - 1, -1, -1):
-            beside = w.math("SUBTRACT", apart[i, j], lamps[j]["taken"])
+            beside = w.math("SUBTRACT", angles[i, j], lamps[j]["taken"])
             room = w.math("MINIMUM", room, beside)
         lamp["room"] = room
 
@@ -235,13 +249,13 @@ def _decide(w, parts, lamps, at, widest):
 def _move_aside(w, parts, lamp, at, later):
     """Gives a flat lamp a single cone beside the nearest ball or sun, if they overlap; returns 1 if
     it has that, otherwise 0."""
-    overlaps = w.math("LESS_THAN", later.room, lamp["reach"])
+    overlaps = w.math("LESS_THAN", later["room"], lamp["reach"])
     # Constant where no later slot has a ball or a sun, so that Cycles removes what follows.
-    has_later = w.math("LESS_THAN", later.room, _FAR - 0.1)
+    has_later = w.math("LESS_THAN", later["room"], _FAR - 0.1)
     # Part of a lamp that the horizon cuts may be hidden: that is left to random directions.
     whole = w.math("GREATER_THAN", lamp["clear"], w.math("SUBTRACT", lamp["count"], 0.01))
-    alone = w.math("LESS_THAN", lamp["reach"], later.others)
-    other = {"other": later.towards, "other_radius": later.radius}
+    alone = w.math("LESS_THAN", lamp["reach"], later["others"])
+    other = {"other": later["nearest"], "other_radius": later["radius"]}
     made = parts.add("aside", at=at, **lamp, **other)
     aside = w.math("MULTIPLY", lamp["flat"], has_later)
     for condition in (overlaps, whole, alone, made["fits"]):

@@ -6,7 +6,7 @@ from dataclasses import replace
 import bpy
 
 from ..common import editable
-from ..groups import bump_correction, nodes
+from ..groups import bump_correction, model_nodes, nodes
 from ..packs import pack
 from ..trees import animation
 from .instances import Instances
@@ -45,7 +45,7 @@ def _values(part):
 
 def is_converted(node):
     """Whether a node replaces one of Blender's own."""
-    return nodes.is_ours(node) and BEFORE in node
+    return model_nodes.is_ours(node) and BEFORE in node
 
 
 def _before(group):
@@ -70,13 +70,15 @@ def restore(material):
     all materials that use these. Where the nodes were deleted, uses the twin, which also consists
     of Blender's own nodes. Returns the number of nodes. Raises ValueError if there is neither."""
     editable.check(material)
-    pairs = [(n, _before(n)) for n in nodes.all_nodes(material) if is_converted(n)]
+    pairs = [(n, _before(n)) for n in model_nodes.all_nodes(material) if is_converted(n)]
     for block in dict.fromkeys(group.id_data for group, _ in pairs):
         editable.check(block)
     for group, before in pairs:
         if before is None:  # refuses before anything is changed
-            for model in (group, *filter(nodes.is_ours, _helpers(group))):
-                pack.model(nodes.identity(model).model).resolve("twin", nodes.all_values(model))
+            for model in (group, *filter(model_nodes.is_ours, _helpers(group))):
+                pack.model(model_nodes.identity(model).model).resolve(
+                    "twin", model_nodes.all_values(model)
+                )
     own = [group for group, _ in pairs if group.id_data == material.node_tree]
     corrected = [bool(group.get(CORRECTED, True)) for group in own]
     shared = dict.fromkeys(group.id_data for group, _ in pairs if group not in own)
@@ -85,7 +87,7 @@ def restore(material):
         _restore_node(group, before, readers)
     if own:
         bump_correction.restore(material, all(corrected))
-    for user in dict.fromkeys(user for tree in shared for user in nodes.users_of(tree)):
+    for user in dict.fromkeys(user for tree in shared for user in model_nodes.users_of(tree)):
         bump_correction.prepare(user)
     nodes.remove_unused_groups()
     return len(pairs)
@@ -93,8 +95,8 @@ def restore(material):
 
 def _moved_back(node, before):
     """The sockets to which animation was moved, and those of the restored node."""
-    if nodes.is_ours(node):
-        sockets = nodes.sockets(node)
+    if model_nodes.is_ours(node):
+        sockets = model_nodes.sockets(node)
     else:
         sockets = dict(node.outputs.items())
         sockets |= {INPUT + socket.identifier: socket for socket in node.inputs}
@@ -106,7 +108,7 @@ def _moved_back(node, before):
 def _restore_node(group, before, readers):
     tree, helpers = group.id_data, _helpers(group)
     if before is None:
-        for model in [group, *filter(nodes.is_ours, helpers)]:
+        for model in [group, *filter(model_nodes.is_ours, helpers)]:
             nodes.switch(model, "twin")
         for key in (BEFORE, CORRECTED, MOVED):
             group.pop(key, None)

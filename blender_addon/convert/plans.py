@@ -10,7 +10,7 @@ import numpy as np
 from .. import lamps
 from ..common import editable
 from ..common.i18n import Sentence, in_percent, say
-from ..groups import nodes
+from ..groups import model_nodes
 from ..nearest import layer, native_bsdf
 from ..nearest.native_bsdf import Native
 from ..nearest.nearest_model import base_of, candidates, matte_of, nearest, scale_of, with_width
@@ -345,7 +345,7 @@ def _of_group(made):
     tree = made.node.id_data
     if tree.is_embedded_data:
         return made
-    others = tuple(m for m in nodes.users_of(tree) if m != made.material)
+    others = tuple(m for m in model_nodes.users_of(tree) if m != made.material)
     effective = effective_sockets(made.node)
     kept = {name for socket in made.kept for name in _group_inputs(made.node.inputs[socket])}
     lost = [name for socket in effective for name in _group_inputs(socket) if name not in kept]
@@ -377,6 +377,6 @@ def _convertible(material):
         locked = (group for group in shown.within if not editable.keeps_changes(group.node_tree))
         if (group := next(locked, None)) is not None:
             found |= {group} if shown.node.bl_idname in KINDS else set()
-        elif shown.node.bl_idname not in STAYING and not nodes.is_ours(shown.node):
+        elif shown.node.bl_idname not in STAYING and not model_nodes.is_ours(shown.node):
             found.add(shown.node)
-    return [node for node in nodes.all_nodes(material) if node in found]
+    return [node for node in model_nodes.all_nodes(material) if node in found]

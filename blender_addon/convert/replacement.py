@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import bpy
 
 from ..content import group_content
-from ..groups import bump_correction, nodes
+from ..groups import bump_correction, model_nodes, nodes
 from ..nearest import native_bsdf
 from ..packs import pack
 from ..trees import animation, shader_trees, shader_values
@@ -67,7 +67,7 @@ class Replacement:
         for prepared, group in zip(parts, groups, strict=True):
             for name, parameter in prepared.part.links.items():
                 if self._direct.get(parameter) == (prepared.part, name):
-                    self._given[parameter] = nodes.sockets(group)[name]
+                    self._given[parameter] = model_nodes.sockets(group)[name]
         self._put(self._joined(groups))
         self._move_animation()
         self._redirect_readers()
@@ -102,8 +102,12 @@ class Replacement:
         for name, source in self._moving.items():
             socket, output = self._node.inputs[name], source.outputs[0]
             target = output.links[0].to_socket if len(output.links) == 1 else None
-            if target is not None and nodes.is_ours(target.node) and target.type == socket.type:
-                names = {s: parameter for parameter, s in nodes.sockets(target.node).items()}
+            if (
+                target is not None
+                and model_nodes.is_ours(target.node)
+                and target.type == socket.type
+            ):
+                names = {s: parameter for parameter, s in model_nodes.sockets(target.node).items()}
                 self._mark(target.node, names[target], socket)
                 target.default_value = socket.default_value
                 self._tree.nodes.remove(source)
@@ -120,8 +124,8 @@ class Replacement:
             socket = self._node.inputs[name]
             if name in self._moving or place.is_linked or not self._readers.of(socket):
                 continue
-            if nodes.is_ours(place.node):
-                names = {s: parameter for parameter, s in nodes.sockets(place.node).items()}
+            if model_nodes.is_ours(place.node):
+                names = {s: parameter for parameter, s in model_nodes.sockets(place.node).items()}
                 self._mark(place.node, names[place], socket)
             else:
                 self._mark(place.node, INPUT + place.identifier, socket)
@@ -142,8 +146,8 @@ class Replacement:
             group[CORRECTED] = bump_correction.recorded(self._plan.material)
         self._group = group
         for name, value in prepared.values.items():
-            nodes.set_value(group, name, value)
-        present = nodes.sockets(group)
+            model_nodes.set_value(group, name, value)
+        present = model_nodes.sockets(group)
         for name, socket in prepared.part.links.items():
             if source := self._source(socket):
                 tree.links.new(source, present[name])

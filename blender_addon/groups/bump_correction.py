@@ -7,7 +7,7 @@ versions turned it off for every form and did not record the user's choice.
 """
 
 from ..common.i18n import say
-from . import nodes
+from . import model_nodes
 
 #: Custom property of a material: the setting before it was turned off.
 _BEFORE = "brdfc_bump_map_correction"
@@ -15,7 +15,7 @@ CODE = "bump_correction"
 
 
 def _is_needed_off(material):
-    entries = (nodes.manifest_entry(node) for node in nodes.group_nodes(material))
+    entries = (model_nodes.manifest_entry(node) for node in model_nodes.group_nodes(material))
     return any(CODE in entry.form.get("warnings", []) for entry in entries if entry)
 
 

@@ -10,7 +10,7 @@ from bpy.app.handlers import persistent
 
 from .. import lamps
 from ..common import app_handlers
-from . import automatic, nodes
+from . import automatic, model_nodes, nodes
 
 
 def _imported_groups(context):
@@ -30,7 +30,7 @@ def _imported_groups(context):
 @persistent
 def _after_import(context):
     imported = _imported_groups(context)
-    groups = [group for group in imported if nodes.TAG in group]
+    groups = [group for group in imported if model_nodes.TAG in group]
     known = {group.session_uid for group in groups}
     if groups or any(lamps.is_group(group) for group in imported):
         lamps.follow()

@@ -11,7 +11,7 @@ from ..common.extension import PACKAGE
 from ..common.i18n import form_name, of_error, say
 from ..content.group_sockets import VECTORS
 from ..packs import pack
-from . import nodes
+from . import model_nodes, nodes
 
 
 @dataclass(frozen=True)
@@ -52,32 +52,32 @@ def others():
     """[(material, node)]: group nodes of the open file that are of another version."""
     found = []
     for material in bpy.data.materials:
-        for node in nodes.group_nodes(material):
+        for node in model_nodes.group_nodes(material):
             # The nodes of a group that several materials share would be found once per material.
-            if nodes.manifest_entry(node) is None and node not in [n for _, n in found]:
+            if model_nodes.manifest_entry(node) is None and node not in [n for _, n in found]:
                 found.append((material, node))
     return found
 
 
 def refusal(material, node):
     """Why a node can't take this version's shader with all of its settings; None if it can."""
-    model_name, _ = nodes.identity(node)
+    model_name, _ = model_nodes.identity(node)
     for block in (material, node.id_data):
         if block.library is not None:
             return say("it is linked from {file}; update it there", file=block.library.filepath)
     if why := editable.refusal(material, node.id_data):
         return why
-    if nodes.is_newer(node):
+    if model_nodes.is_newer(node):
         return say(
             "{later} made it, and this is {own}",
-            later=nodes.made_by(node),
+            later=model_nodes.made_by(node),
             own=pack.manifest()["generator"],
         )
     if model_name not in pack.model_names():
         return say("this version has no model {model!r}", model=model_name)
     model = pack.model(model_name)
     known = model.parameters
-    for name, value in nodes.all_values(node).items():
+    for name, value in model_nodes.all_values(node).items():
         if name in model.fixed or name in VECTORS:
             continue
         if name not in known:
@@ -108,7 +108,7 @@ def update():
         if why := refusal(material, node):
             refusals.append(say("{node}: {what}", node=what, what=why))
             continue
-        model_name, form = nodes.identity(node)
+        model_name, form = model_nodes.identity(node)
         try:
             try:
                 nodes.switch(node, form)
@@ -117,7 +117,7 @@ def update():
                 said = say(
                     "{before} is now {after}",
                     before=form_name(form),
-                    after=form_name(nodes.identity(node).form),
+                    after=form_name(model_nodes.identity(node).form),
                 )
                 notes.append(say("{node}: {what}", node=what, what=said))
         except (ValueError, RuntimeError) as error:  # CompileError and PackError are RuntimeErrors

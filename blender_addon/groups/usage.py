@@ -9,7 +9,7 @@ import numpy as np
 from ..common.i18n import form_name, say
 from ..packs import pack
 from ..packs.parameter_values import value_text
-from . import nodes
+from . import model_nodes
 
 VARIES = {"varies": True}
 
@@ -37,20 +37,20 @@ def _as_typed(value):
 
 
 def _use(material, node):
-    model_name, representation = nodes.identity(node)
-    model, varying = pack.model(model_name), nodes.varying(node)
+    model_name, representation = model_nodes.identity(node)
+    model, varying = pack.model(model_name), model_nodes.varying(node)
     parameters = dict(model.fixed)
     for name in model.parameters:
-        value = None if name in varying else nodes.get_value(node, name)
+        value = None if name in varying else model_nodes.get_value(node, name)
         parameters[name] = VARIES if value is None else _as_typed(value)
-    asked = "auto" if nodes.is_automatic(node) else representation
+    asked = "auto" if model_nodes.is_automatic(node) else representation
     entry = {"model": model_name, "representation": asked, "parameters": parameters}
     return Use(
         material,
         node,
         entry,
         representation,
-        (node.node_tree[nodes.TAG]["digest"], nodes.is_baked(node)),
+        (node.node_tree[model_nodes.TAG]["digest"], model_nodes.is_baked(node)),
     )
 
 
@@ -71,7 +71,7 @@ def uses():
     """{MATERIAL: Use} of the open file; MATERIAL/NODE for a material with several model nodes."""
     found = {}
     for material in sorted(bpy.data.materials, key=lambda m: m.library is not None):
-        ours = nodes.group_nodes(material)
+        ours = model_nodes.group_nodes(material)
         for node in ours:
             names = _names(material, node, len(ours) == 1)
             found[next(name for name in names if name not in found)] = _use(material, node)

@@ -7,7 +7,7 @@ from bpy.types import Operator
 
 from .. import api
 from ..common.i18n import rpt, say, tip
-from ..groups import nodes
+from ..groups import model_nodes, nodes
 from ..packs import pack
 from .common import ERRORS, keeps_changes, refused, report_osl
 
@@ -103,7 +103,7 @@ class BRDFC_OT_new_material(_ModelOperator, Operator):
         target.active_material = material  # Blender adds a slot if there is none
         said = say("{material} assigned to {object}", material=material.name, object=target.name)
         self.report({"INFO"}, rpt(said))
-        report_osl(self, nodes.group_nodes(material), context.scene)
+        report_osl(self, model_nodes.group_nodes(material), context.scene)
         return {"FINISHED"}
 
 

@@ -8,7 +8,7 @@ from bpy.types import Operator
 
 from .. import api, convert
 from ..common.i18n import rpt, say
-from ..groups import nodes
+from ..groups import model_nodes
 from ..panels.labels import wrapped
 from .common import ERRORS, ChangesActiveMaterial, refused, report_osl
 
@@ -82,7 +82,7 @@ class BRDFC_OT_convert(Operator):
             self.report({"INFO"}, rpt(said))
         if said := convert.warning(plans, context.scene):
             self.report({"WARNING"}, rpt(said))
-        done = [node for m in _selected_materials(context) for node in nodes.group_nodes(m)]
+        done = [node for m in _selected_materials(context) for node in model_nodes.group_nodes(m)]
         report_osl(self, done, context.scene)
         return {"FINISHED"} if count else {"CANCELLED"}
 

@@ -9,7 +9,7 @@ from bpy.types import FileHandler, Operator
 
 from .. import api
 from ..common.i18n import Sentence, iface, in_percent, rpt, say
-from ..groups import nodes
+from ..groups import model_nodes
 from ..measured import ENDINGS, SUM
 from ..packs import pack
 from ..panels.labels import wrapped
@@ -27,7 +27,7 @@ def _assign(operator, context, material):
     target.active_material = material  # Blender adds a slot if there is none
     said = say("{material} assigned to {object}", material=material.name, object=target.name)
     operator.report({"INFO"}, rpt(said))
-    report_osl(operator, nodes.group_nodes(material), context.scene)
+    report_osl(operator, model_nodes.group_nodes(material), context.scene)
 
 
 class BRDFC_OT_new_measured_material(ModalJob, Operator):

@@ -10,7 +10,7 @@ from bpy.types import Operator
 from .. import api
 from ..common import color, editable
 from ..common.i18n import Sentence, iface, of_error, rpt, say, tip
-from ..groups import nodes
+from ..groups import model_nodes, nodes
 from ..packs import kernel, optical
 from ..panels.labels import wrapped
 from ..panels.methods import METHODS
@@ -43,21 +43,21 @@ class BRDFC_OT_switch(ChangesActiveMaterial, Operator):
         material = context.object.active_material
         materials = bpy.data.materials if self.all_users else [material]
         try:
-            node = nodes.named(material, self.node)
-            identity = nodes.identity(node)
+            node = model_nodes.named(material, self.node)
+            identity = model_nodes.identity(node)
             editable.check(node.id_data)
             # All nodes are found before any is changed. Groups are shared by materials.
             alike = [
                 other
                 for user in filter(editable.keeps_changes, materials)
-                for other in nodes.group_nodes(user)
-                if editable.keeps_changes(other.id_data) and nodes.identity(other) == identity
+                for other in model_nodes.group_nodes(user)
+                if editable.keeps_changes(other.id_data) and model_nodes.identity(other) == identity
             ]
             changed = dict.fromkeys(alike) if self.all_users else [node]
             for other in changed:
                 nodes.switch(other, self.representation)
             for tree in dict.fromkeys(other.id_data for other in changed):
-                for user in nodes.users_of(tree):
+                for user in model_nodes.users_of(tree):
                     api.prepare_material(user)
         except ERRORS as error:
             return refused(self, error)
@@ -92,8 +92,8 @@ class BRDFC_OT_details(OfActiveMaterial, Operator):
         from ..panels import ui
 
         try:
-            node = nodes.named(context.object.active_material, self.node)
-            made = nodes.manifest_entry(node)
+            node = model_nodes.named(context.object.active_material, self.node)
+            made = model_nodes.manifest_entry(node)
         except ERRORS as error:
             said, more = of_error(error)
             return [said, more] if more else [said]
@@ -152,7 +152,7 @@ class BRDFC_OT_add_albedo(ChangesActiveMaterial, Operator):
     def execute(self, context):
         material = context.object.active_material
         try:
-            nodes.add_albedo(nodes.named(material, self.node))
+            nodes.add_albedo(model_nodes.named(material, self.node))
         except ERRORS as error:
             return refused(self, error)
         return {"FINISHED"}
@@ -180,8 +180,12 @@ class BRDFC_OT_kernel(ChangesActiveMaterial, Operator):
         return {"FINISHED"}
 
     def _group(self, material):
-        ours = [n for n in nodes.group_nodes(material) if nodes.identity(n).model == kernel.MODEL]
-        wanted = [n for n in ours if nodes.key(n) == self.node] if self.node else ours
+        ours = [
+            n
+            for n in model_nodes.group_nodes(material)
+            if model_nodes.identity(n).model == kernel.MODEL
+        ]
+        wanted = [n for n in ours if model_nodes.key(n) == self.node] if self.node else ours
         active = [n for n in wanted if n == n.id_data.nodes.active]
         if not wanted or (len(wanted) > 1 and not active):
             raise ValueError(
@@ -269,7 +273,7 @@ class BRDFC_OT_substance(ChangesActiveMaterial, Operator):
             if self.substance == _FILE and not name.endswith(optical.ENDINGS):
                 expected = say("{file}: expected a file NAME.csv or NAME.txt", file=repr(name))
                 raise ValueError(expected)
-            node = nodes.named(material, self.node) if self.node else None
+            node = model_nodes.named(material, self.node) if self.node else None
             stated = self.properties.is_property_set("thickness")
             values = api.set_substance(material, name, node, self.thickness if stated else None)
         except ERRORS as error:

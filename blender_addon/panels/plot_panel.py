@@ -10,7 +10,7 @@ from bpy.types import Panel
 
 from ..common import color
 from ..common.i18n import form_name, in_percent, of_error, say
-from ..groups import nodes
+from ..groups import model_nodes
 from ..packs import pack
 from .labels import wrapped
 
@@ -22,9 +22,9 @@ _places = {}  # values and form: name of the preview, legend
 
 def _values(node):
     """A node's values by name, and the names of linked parameters."""
-    model_name, _ = nodes.identity(node)
+    model_name, _ = model_nodes.identity(node)
     model = pack.model(model_name)
-    values = model.fixed | {name: nodes.get_value(node, name) for name in model.parameters}
+    values = model.fixed | {name: model_nodes.get_value(node, name) for name in model.parameters}
     return values, [name for name, value in values.items() if value is None]
 
 
@@ -34,9 +34,9 @@ def drawn(node):
     # NumPy's formulas are imported on first use.
     from ..plotting import form_light, plots, shader_text
 
-    model_name, _ = nodes.identity(node)
+    model_name, _ = model_nodes.identity(node)
     values, _ = _values(node)
-    form = functools.partial(form_light.lobes, node) if nodes.is_fitted(node) else None
+    form = functools.partial(form_light.lobes, node) if model_nodes.is_fitted(node) else None
     try:
         return plots.draw(model_name, values, form)
     except shader_text.Unreadable:
@@ -46,12 +46,12 @@ def drawn(node):
 def picture(node):
     """The preview for a node's values and its plots.Legend; drawn if the values are new. Raises
     ValueError for a model that the extension lacks."""
-    model_name, form = nodes.identity(node)
+    model_name, form = model_nodes.identity(node)
     values, _ = _values(node)
     key = (
         model_name,
         form,
-        node.node_tree[nodes.TAG]["digest"],
+        node.node_tree[model_nodes.TAG]["digest"],
         color.working_space(),
         *((n, tuple(np.ravel(v))) for n, v in values.items() if v is not None),
     )
@@ -83,7 +83,7 @@ def _shares(color):
 
 
 def _form_said(node, legend):
-    form = form_name(nodes.identity(node).form)
+    form = form_name(model_nodes.identity(node).form)
     if legend.form is not None:
         percent = _percent(legend.form)
         return say(
@@ -91,7 +91,7 @@ def _form_said(node, legend):
             form=form,
             percent=percent,
         )
-    if nodes.is_fitted(node):
+    if model_nodes.is_fitted(node):
         return say("Render method {form}: what it reflects can't be plotted", form=form)
     return say("Render method {form}: reflects what the model does", form=form)
 
@@ -129,7 +129,7 @@ def _legend(node, legend):
 
 
 def draw_plots(layout, material):
-    for node in nodes.group_nodes(material):
+    for node in model_nodes.group_nodes(material):
         column = layout.column(align=True)
         column.label(text=node.label or node.name, icon="MATERIAL", translate=False)
         try:
@@ -146,7 +146,7 @@ def draw_plots(layout, material):
         wrapped(column, say("Below: reflected share, views from 0\u00b0 to 90\u00b0"))
         _, linked = _values(node)
         if linked:
-            labels = pack.model(nodes.identity(node).model).parameters
+            labels = pack.model(model_nodes.identity(node).model).parameters
             names = ", ".join(labels[name]["label"] for name in linked)
             said = say("At the default of {parameters}", parameters=names)
             wrapped(column, said, "INFO")

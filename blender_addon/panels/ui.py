@@ -10,7 +10,7 @@ from bpy.types import Menu, Panel
 from .. import convert, lamps
 from ..common import color, editable
 from ..common.i18n import form_name, iface, in_percent, of_error, say
-from ..groups import nodes
+from ..groups import model_nodes, nodes
 from ..packs import energy, kernel, optical, pack
 from ..trees import shader_trees
 from ..warnings import checks, closure_slots
@@ -134,7 +134,7 @@ def cost_text(node, form):
     if form["cost"] is None:
         return say("not measured")
     # In a pack cut to a scene, forms have fewer parameters, so their cost differs.
-    cut = nodes.is_baked(node) or pack.model(nodes.identity(node).model).fixed
+    cut = model_nodes.is_baked(node) or pack.model(model_nodes.identity(node).model).fixed
     times = f"{form['cost']:.2f}"
     if cut:
         return say("{times} x Glossy, at default parameters", times=times)
@@ -148,10 +148,10 @@ ANGLES = (0, 45, 75, 85)
 def energy_text(node):
     """Directional albedo for the current values at a few view angles that the pack covers, or the
     reason why there is none."""
-    model_name, _ = nodes.identity(node)
+    model_name, _ = model_nodes.identity(node)
     values = {}
     for name, parameter in pack.model(model_name).parameters.items():
-        value = nodes.get_value(node, name)
+        value = model_nodes.get_value(node, name)
         if value is None:
             return say("depends on what is linked to {socket}", socket=parameter["label"])
         values[name] = value
@@ -170,12 +170,12 @@ def energy_text(node):
 def _add_method(row, node, name, pressed):
     """The button of a render method."""
     item = row.operator("brdfc.switch", text=form_name(name).template, depress=pressed)
-    item.node, item.representation = nodes.key(node), name
+    item.node, item.representation = model_nodes.key(node), name
 
 
 def _draw_form(layout, node, form, scene, changes):
-    model_name, representation = nodes.identity(node)
-    if lean := nodes.is_baked(node):
+    model_name, representation = model_nodes.identity(node)
+    if lean := model_nodes.is_baked(node):
         wrapped(
             layout,
             say("Lean: only what this file needs. A render method brings the whole model back"),
@@ -183,8 +183,8 @@ def _draw_form(layout, node, form, scene, changes):
     model = pack.model(model_name)
     row = layout.row(align=True)
     row.enabled = changes
-    values = {key: nodes.get_value(node, key) for key in model.parameters}
-    refusals, automatic = [], nodes.is_automatic(node)
+    values = {key: model_nodes.get_value(node, key) for key in model.parameters}
+    refusals, automatic = [], model_nodes.is_automatic(node)
     if model.native_form:
         _add_method(row, node, "auto", automatic)
     for name, method in model.forms.items():
@@ -207,7 +207,7 @@ def _draw_form(layout, node, form, scene, changes):
         translate=False,
         icon="QUESTION",
         emboss=False,
-    ).node = nodes.key(node)
+    ).node = model_nodes.key(node)
     wrapped(column, say("Cost: {cost}", cost=cost_text(node, form)))
     if model.entry.get("albedo"):
         wrapped(column, say("Albedo: {albedo}", albedo=energy_text(node)))
@@ -216,7 +216,7 @@ def _draw_form(layout, node, form, scene, changes):
 def _draw_values(layout, node):
     column = layout.column()
     column.use_property_split = True
-    for socket in nodes.sockets(node).values():
+    for socket in model_nodes.sockets(node).values():
         if socket.type != "VECTOR":
             row = column.row()
             row.enabled = not shader_trees.is_driven(socket)
@@ -225,10 +225,10 @@ def _draw_values(layout, node):
 
 def draw_node(layout, node, scene):
     """Shows model, form, error, cost, energy and values of a group node."""
-    model_name, _ = nodes.identity(node)
+    model_name, _ = model_nodes.identity(node)
     layout.label(text=node.label or node.name, icon="MATERIAL", translate=False)
     changes = editable.keeps_changes(node.id_data)
-    if made := nodes.manifest_entry(node):
+    if made := model_nodes.manifest_entry(node):
         model = pack.model(model_name)
         column = layout.column(align=True)
         for said in filter(None, (model.paper, model.entry["equations"])):
@@ -239,17 +239,21 @@ def draw_node(layout, node, scene):
     layout.enabled = changes
     if made and optical.can_have(model_name):
         menu = layout.operator_menu_enum("brdfc.substance", "substance", icon="MATERIAL_DATA")
-        menu.node = nodes.key(node)
-    may_have = made and not nodes.is_baked(node) and model.has_albedo
+        menu.node = model_nodes.key(node)
+    may_have = made and not model_nodes.is_baked(node) and model.has_albedo
     if may_have and nodes.ALBEDO not in node.outputs:
-        layout.operator("brdfc.add_albedo", icon="ADD").node = nodes.key(node)
+        layout.operator("brdfc.add_albedo", icon="ADD").node = model_nodes.key(node)
     if model_name == kernel.MODEL:
-        layout.operator("brdfc.kernel", icon="FCURVE").node = nodes.key(node)
+        layout.operator("brdfc.kernel", icon="FCURVE").node = model_nodes.key(node)
 
 
 def draw_lamps(layout, material, scene):
     """Shows the lamps that the material's models aim at, if any of them does."""
-    forms = [made.form for n in nodes.group_nodes(material) if (made := nodes.manifest_entry(n))]
+    forms = [
+        made.form
+        for n in model_nodes.group_nodes(material)
+        if (made := model_nodes.manifest_entry(n))
+    ]
     slots = max((form.get("lamps") or 0 for form in forms), default=0)
     if slots == 0:
         return
@@ -305,7 +309,7 @@ def draw_material(layout, material, scene):
     found = checks.warnings(material, scene)
     first = [f for f in found if f.severity == "ERROR" or f.code in UNABLE]
     draw_findings(layout, first)
-    ours = nodes.group_nodes(material)
+    ours = model_nodes.group_nodes(material)
     if why := editable.refusal(material, *(node.id_data for node in ours)):
         wrapped(layout.column(align=True), why, "LINKED")
         if not any(BUTTONS.get(f.code) == MAKE_LOCAL for f in found):
@@ -334,7 +338,7 @@ class _BrdfcPanel:
 
 def _has_ours(context):
     material = getattr(context.object, "active_material", None)
-    return material is not None and bool(nodes.group_nodes(material))
+    return material is not None and bool(model_nodes.group_nodes(material))
 
 
 class MATERIAL_PT_brdfc(_BrdfcPanel, Panel):

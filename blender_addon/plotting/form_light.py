@@ -5,12 +5,12 @@ or from a pack of the file's own."""
 
 import numpy as np
 
-from ..groups import nodes
+from ..groups import model_nodes, nodes
 from . import shader_nodes, shader_text
 
 
 def lobes(node, values, wo):
-    """shader_text.Lobes of a group node for which nodes.is_fitted() holds.
+    """shader_text.Lobes of a group node for which model_nodes.is_fitted() holds.
 
     `values`: of all parameters; `wo`: unit vectors (k, 3) to the viewer, above the surface. This
     function and the Lobes it returns raise shader_text.Unreadable."""
@@ -18,7 +18,7 @@ def lobes(node, values, wo):
     if not nodes.is_native(group):
         return shader_text.lobes(nodes.source_text(group), values, wo)
     given = dict.fromkeys((s.identifier for s in node.inputs), np.zeros(3))
-    for name, socket in nodes.sockets(node).items():
+    for name, socket in model_nodes.sockets(node).items():
         if name in values:
             given[socket.identifier] = values[name]
     return shader_nodes.lobes(group, given, wo)

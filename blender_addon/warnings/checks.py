@@ -6,7 +6,7 @@ from dataclasses import replace
 import bpy
 
 from ..common.i18n import Sentence, in_percent, say
-from ..groups import nodes
+from ..groups import model_nodes
 from ..packs import device, pack
 from .context import MaterialContext, NodeContext, SceneContext, twin_of
 from .rows import WARNING, Finding
@@ -35,7 +35,7 @@ def _by_twin(finding, ours):
 def _twin_error(node):
     """Error of a node's twin; None if it is not known at the node's values."""
     twin = twin_of(node)
-    if twin is None or twin.refusal(nodes.all_values(node)):
+    if twin is None or twin.refusal(model_nodes.all_values(node)):
         return None
     return twin.entry["error"]["relative_l1"]
 
@@ -47,18 +47,18 @@ def scene_warnings(scene):
 
 def of_file(scene):
     """See api.scene_warnings()."""
-    ours = [node for material in bpy.data.materials for node in nodes.shown_nodes(material)]
-    needed = not all(map(nodes.runs_anywhere, ours))
+    ours = [node for material in bpy.data.materials for node in model_nodes.shown_nodes(material)]
+    needed = not all(map(model_nodes.runs_anywhere, ours))
     return [f for f in scene_warnings(scene) if needed or f.code not in UNABLE]
 
 
 def of_scene(ours, scene):
     """The findings of a scene that concern these nodes; forms of Blender's own nodes run
     anywhere."""
-    scripted = [node for node in ours if not nodes.runs_anywhere(node)]
+    scripted = [node for node in ours if not model_nodes.runs_anywhere(node)]
     found = scene_warnings(scene) if scripted else []
     takes_nodes = scene.render.engine == "CYCLES" or device.is_eevee(scene)
-    if not takes_nodes or not all(map(nodes.has_stand_in, scripted)):
+    if not takes_nodes or not all(map(model_nodes.has_stand_in, scripted)):
         return found
     return [_by_twin(f, scripted) if f.code in UNABLE else f for f in found]
 
@@ -71,7 +71,7 @@ def _of_node(at):
 def why_not_run(material, scene):
     """The findings that explain why a material's shaders do not run in a scene: errors where they
     render black, warnings where twins stand in for them."""
-    ours = nodes.shown_nodes(material)
+    ours = model_nodes.shown_nodes(material)
     return [f for f in of_scene(ours, scene) if f.code in UNABLE]
 
 
@@ -82,7 +82,9 @@ def warnings(material, scene):
     stopped = any(f.code in UNABLE for f in found)
     of_nodes = {}
     for node in at.nodes:
-        stood_in = stopped and nodes.has_stand_in(node) and not nodes.runs_anywhere(node)
+        stood_in = (
+            stopped and model_nodes.has_stand_in(node) and not model_nodes.runs_anywhere(node)
+        )
         for finding in _of_node(NodeContext(at, node, stood_in)):
             of_nodes.setdefault(finding, []).append(node.label or node.name)
     found += [_said_of(finding, names) for finding, names in of_nodes.items()]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..groups import nodes
+from ..groups import model_nodes
 from ..packs import pack
 from ..trees import shader_trees
 
@@ -99,11 +99,11 @@ def of_material(material):
     a_lamp = pack.manifest()["closure_slots"]["lamp"]
     slots, slots_per_lamp, trees = 0, 0, 0
     for node in (shown.node for shown in shader_trees.shown(material)):
-        if nodes.is_ours(node) and (made := nodes.manifest_entry(node)):
+        if model_nodes.is_ours(node) and (made := model_nodes.manifest_entry(node)):
             aimed_at = made.form.get("lamps") or 0
             slots += _times(node) * (made.form.get("slots", 0) - aimed_at * a_lamp)
             slots_per_lamp += _times(node) * a_lamp * bool(aimed_at)
-            trees += bool(aimed_at) and nodes.identity(node).form == "nodes"
+            trees += bool(aimed_at) and model_nodes.identity(node).form == "nodes"
         else:
             slots += _times(node) * _native_slots(node)
     return ClosureUsage(slots, slots_per_lamp, trees)

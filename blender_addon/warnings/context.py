@@ -7,7 +7,7 @@ from functools import cached_property
 import bpy
 
 from .. import lamps
-from ..groups import nodes, update
+from ..groups import model_nodes, update
 from ..lamps import emission
 from ..packs import device, pack
 from . import closure_slots
@@ -18,9 +18,9 @@ _PLAIN_WORLD = {"ShaderNodeBackground", "ShaderNodeOutputWorld"}
 
 def twin_of(node):
     """The twin of a node's model, as pack.Form; None if it has no twin."""
-    if nodes.manifest_entry(node) is None:
+    if model_nodes.manifest_entry(node) is None:
         return None
-    return pack.model(nodes.identity(node).model).forms.get("twin")
+    return pack.model(model_nodes.identity(node).model).forms.get("twin")
 
 
 class SceneContext:
@@ -53,7 +53,7 @@ class SceneContext:
     def _is_evenly_dim(self):
         """Whether nothing shines but lamps, and a uniform world no brighter than white."""
         world = self.scene.world
-        plain = nodes.all_nodes(world) if world else []
+        plain = model_nodes.all_nodes(world) if world else []
         colors = [n.inputs for n in plain if n.bl_idname == "ShaderNodeBackground"]
         return (
             {n.bl_idname for n in plain} <= _PLAIN_WORLD
@@ -94,7 +94,7 @@ class MaterialContext:
 
     def __init__(self, of_scene, material):
         self.of_scene, self.scene, self.material = of_scene, of_scene.scene, material
-        self.nodes = nodes.shown_nodes(material)
+        self.nodes = model_nodes.shown_nodes(material)
 
     @cached_property
     def use(self):
@@ -110,7 +110,7 @@ class NodeContext:
         self.of_scene, self.scene = of_material.of_scene, of_material.scene
         #: The manifest's entry of the form that is shown, and the parameters by name; both empty if
         #: another version made the node.
-        self.form, self.schema = nodes.manifest_entry(node) or ({}, {})
+        self.form, self.schema = model_nodes.manifest_entry(node) or ({}, {})
         self.is_current = bool(self.form)
         if stood_in:
             twin = twin_of(node)
@@ -132,7 +132,7 @@ class NodeContext:
     @cached_property
     def values(self):
         """The value of each parameter, None where it is linked."""
-        return nodes.all_values(self.node)
+        return model_nodes.all_values(self.node)
 
     @cached_property
     def why_kept(self):
@@ -146,7 +146,7 @@ class NodeContext:
         tree = self.node.node_tree
         if tree.library is None:
             return None
-        inner = (getattr(n, "node_tree", None) for n in nodes.content_group(tree).nodes)
+        inner = (getattr(n, "node_tree", None) for n in model_nodes.content_group(tree).nodes)
         return next((g for g in inner if g is not None and lamps.is_group(g)), None)
 
     @cached_property

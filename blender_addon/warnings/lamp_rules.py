@@ -3,7 +3,7 @@
 
 from .. import lamps
 from ..common.i18n import say
-from ..groups import nodes
+from ..groups import model_nodes
 
 #: Fraction of the scene's light below which the noise of a lamp is invisible among the others.
 DIM = 0.05
@@ -131,7 +131,7 @@ def without_shadow(at):
 
 def hidden_from_rays(at):
     """Ray Visibility of lamps is off for diffuse or glossy rays."""
-    if not at.cycles_form or nodes.runs_anywhere(at.node):
+    if not at.cycles_form or model_nodes.runs_anywhere(at.node):
         return []
     return _any([x for x in at.lamps if not (x.visible_diffuse and x.visible_glossy)])
 
@@ -140,7 +140,7 @@ def sheared_lamps(at):
     """Area lamps are sheared. In Cycles, random rays bring another amount of their light than light
     sampling does, so Formula Nodes and sampled forms differ from Blender's own nodes."""
     drawn = "zero_size_lights" in at.cycles_form.get("warnings", []) if at.cycles_form else False
-    if not drawn and not (at.aims and nodes.runs_anywhere(at.node)):
+    if not drawn and not (at.aims and model_nodes.runs_anywhere(at.node)):
         return []
     found = [x for x in at.lamps if lamps.kind_of(x.data).is_distorted(x.matrix_world)]
     objects = {x.name for x in at.lamps}

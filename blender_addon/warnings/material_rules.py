@@ -2,7 +2,7 @@
 """Predicates of warnings about a material as a whole."""
 
 from .. import lamps
-from ..groups import nodes
+from ..groups import model_nodes
 from ..trees import shader_trees
 from . import closure_slots
 from .rows import when
@@ -10,7 +10,7 @@ from .rows import when
 
 def nodes_off(at):
     """The material has nodes, which Use Nodes in its settings turns off."""
-    return when(shader_trees.shading(at.material) is None and nodes.group_nodes(at.material))
+    return when(shader_trees.shading(at.material) is None and model_nodes.group_nodes(at.material))
 
 
 def too_many_closures(at):

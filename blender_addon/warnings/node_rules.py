@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Predicates of warnings about a group node: its shader, its version and its values."""
 
-from ..groups import nodes
+from ..groups import model_nodes, nodes
 from ..packs.parameter_values import unused_parameters, value_text
 from .rows import when
 
@@ -14,19 +14,19 @@ def damaged(at):
 
 def of_later_version(at):
     """A later version of the extension made the node."""
-    newer = not at.is_current and nodes.is_newer(at.node)
-    return when(newer, version=nodes.made_by(at.node))
+    newer = not at.is_current and model_nodes.is_newer(at.node)
+    return when(newer, version=model_nodes.made_by(at.node))
 
 
 def of_version_kept(at):
     """Another version of the extension made the node, and an update can't change it."""
-    kept = not at.is_current and not nodes.is_newer(at.node) and at.why_kept
+    kept = not at.is_current and not model_nodes.is_newer(at.node) and at.why_kept
     return when(kept, why=kept)
 
 
 def of_another_version(at):
     """Another version of the extension made the node."""
-    return when(not at.is_current and not nodes.is_newer(at.node) and not at.why_kept)
+    return when(not at.is_current and not model_nodes.is_newer(at.node) and not at.why_kept)
 
 
 def _is_within(value, limits):
@@ -47,7 +47,7 @@ def _outside(value, label, limits):
 def out_of_range(at):
     """A value is outside the limits of its parameter."""
     for name, parameter in at.schema.items():
-        value = nodes.get_value(at.node, name)
+        value = model_nodes.get_value(at.node, name)
         if parameter["kind"] == "choice" or value is None:
             continue
         for number in value if parameter["kind"] == "color" else (value,):
@@ -68,6 +68,6 @@ def no_effect(at):
 def out_of_fit(at):
     """A value is outside those for which the closures of a fitted form were found."""
     if axis := at.form.get("axis"):
-        value = nodes.get_value(at.node, axis["name"])
+        value = model_nodes.get_value(at.node, axis["name"])
         if value is not None and not _is_within(value, axis):
             yield _outside(value, at.schema[axis["name"]]["label"], axis)

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..groups import nodes
+from ..groups import model_nodes
 from ..packs import device
 from ..trees import shader_trees
 from .rows import when
@@ -56,7 +56,7 @@ def black_aovs(at):
         node.aov_name
         for owner in owners
         if shader_trees.shading(owner) is not None
-        for node in nodes.all_nodes(owner)
+        for node in model_nodes.all_nodes(owner)
         if node.bl_idname == "ShaderNodeOutputAOV" and not node.mute
     }
     names = sorted(wanted & written)

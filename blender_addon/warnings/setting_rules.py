@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from ..groups import nodes
+from ..groups import model_nodes
 from .rows import when
 
 #: Sampled forms derive random numbers from positions in single precision. Measured: they fail where
@@ -31,7 +31,7 @@ def guiding_spoils(at):
 def guiding_costs(at):
     """Path Guiding is on, and the form is Sampled. Measured: it renders correctly, with the same
     noise, but takes half as long again."""
-    sampled = at.form and nodes.identity(at.node).form == "sampled" and not at.stood_in
+    sampled = at.form and model_nodes.identity(at.node).form == "sampled" and not at.stood_in
     return when(sampled and at.scene.cycles.use_guiding)
 
 
@@ -70,7 +70,7 @@ def clamp_highlight(at):
         return []
     bright = max(highlight["f_cos"])
     if highlight["name"]:
-        value = nodes.get_value(at.node, highlight["name"])
+        value = model_nodes.get_value(at.node, highlight["name"])
         if value is not None:
             bright = np.interp(value, highlight["values"], highlight["f_cos"])
     shows = 0 < clamp < max(LOW_CLAMP, CLAMP_OF_HIGHLIGHT * bright)

@@ -110,6 +110,7 @@ def extension(extension_zip):
         "api",
         "common.files",
         "content.group_content",
+        "groups.model_nodes",
         "groups.nodes",
         "lean",
         "operators",

@@ -298,7 +298,7 @@ def test_a_link_takes_the_base_away_and_no_light(extension, empty, model):
     quarters = {}
     for form in ("aimed", "sampled"):
         material = extension.api.new_material(model, form)
-        (node,) = extension.nodes.group_nodes(material)
+        (node,) = extension.model_nodes.group_nodes(material)
         links = material.node_tree
         place = links.nodes.new("ShaderNodeTexCoord")
         apart = links.nodes.new("ShaderNodeSeparateXYZ")
@@ -307,7 +307,7 @@ def test_a_link_takes_the_base_away_and_no_light(extension, empty, model):
         power.inputs[0].default_value = 600.0
         links.links.new(place.outputs["Generated"], apart.inputs[0])
         links.links.new(apart.outputs[0], power.inputs[1])
-        links.links.new(power.outputs[0], extension.nodes.sockets(node)["e"])
+        links.links.new(power.outputs[0], extension.model_nodes.sockets(node)["e"])
         ball.data.materials[0] = material
         bpy.context.view_layer.update()
         pictures = []
@@ -347,8 +347,8 @@ def test_a_link_beyond_the_range_is_its_end(extension, empty, model, name, value
     tree = made[1].node_tree
     number = tree.nodes.new("ShaderNodeValue")
     number.outputs[0].default_value = value
-    (node,) = extension.nodes.group_nodes(made[1])
-    tree.links.new(number.outputs[0], extension.nodes.sockets(node)[name])
+    (node,) = extension.model_nodes.group_nodes(made[1])
+    tree.links.new(number.outputs[0], extension.model_nodes.sockets(node)[name])
     pictures = []
     for material in made:
         # Around the half vector of sun and camera.

@@ -46,7 +46,7 @@ def mix_of(extension, scene, model, count=1, extra=(), others=()):
     material = extension.api.new_material(model)
     tree = material.node_tree
     output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
-    (first,) = extension.nodes.group_nodes(material)
+    (first,) = extension.model_nodes.group_nodes(material)
     names = [model] * (count - 1) + list(others)
     more = [extension.nodes.add_group_node(tree, name).outputs["BSDF"] for name in names]
     more += [tree.nodes.new(kind).outputs[0] for kind in extra]

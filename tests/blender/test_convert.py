@@ -563,7 +563,9 @@ def test_links_stay(extension, convert):
     bump = linked(material, node, "Normal", "ShaderNodeBump")
     plans = convert.plan([material])
     assert convert.apply(plans) == 1
-    gloss, base = (extension.nodes.sockets(g) for g in extension.nodes.group_nodes(material))
+    gloss, base = (
+        extension.model_nodes.sockets(g) for g in extension.model_nodes.group_nodes(material)
+    )
     assert base["rho"].links[0].from_node == colour
     view = next(n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeLayerWeight")
     bend = view.inputs["Normal"].links[0].from_node
@@ -586,7 +588,7 @@ def test_the_colour_of_a_mirror_may_be_linked(extension, convert, kind, inputs, 
     colour = linked(material, node, name)
     plan = only(convert.plan([material]))
     assert convert.apply([plan]) == 1
-    (group,) = extension.nodes.group_nodes(material)
+    (group,) = extension.model_nodes.group_nodes(material)
     (socket,) = (s for s in group.inputs if s.is_linked)
     assert socket.links[0].from_node == colour and socket.type == "RGBA"
 
@@ -631,8 +633,8 @@ def test_animation_that_shows_nothing_is_no_reason(convert):
 def test_a_strip_still_moves_a_parameter_in_another_form(extension, convert, empty):
     material = extension.api.new_material("phong_material", "sampled", kd=0.1)
     helpers.add_sphere(empty, material)  # so that Blender evaluates it
-    (group,) = extension.nodes.group_nodes(material)
-    socket = extension.nodes.sockets(group)["kr"]
+    (group,) = extension.model_nodes.group_nodes(material)
+    socket = extension.model_nodes.sockets(group)["kr"]
     for frame, value in ((1, 0.2), (10, 0.6)):
         socket.default_value = value
         socket.keyframe_insert("default_value", frame=frame)
@@ -726,8 +728,8 @@ def test_a_linked_roughness_is_followed(extension, convert):
     ((name, factor, power, low, high, stretched), *_) = plan.widths
     assert stretched == 0
     assert convert.apply([plan]) == 1
-    (group,) = extension.nodes.group_nodes(material)
-    at, operations = extension.nodes.sockets(group)[name], []
+    (group,) = extension.model_nodes.group_nodes(material)
+    at, operations = extension.model_nodes.sockets(group)[name], []
     while at.is_linked:
         here = at.links[0].from_node
         if here == value:
@@ -822,14 +824,14 @@ def test_a_plan_changes_nothing_and_a_failure_neither(extension, convert, monkey
         convert.apply(plans)
     assert helpers.counts() == before
     for material in materials:
-        assert not extension.nodes.group_nodes(material)
+        assert not extension.model_nodes.group_nodes(material)
 
 
 def test_functions_take_one_of_several_models(extension, convert):
     """As Convert makes them of a plastic."""
     material, _ = material_of("principled", "GGX", Base_Color=GOLD, Roughness=0.4)
     assert convert.apply(convert.plan([material])) == 1
-    gloss, base = extension.nodes.group_nodes(material)
+    gloss, base = extension.model_nodes.group_nodes(material)
     api, several = (
         extension.api,
         "has 2 reflection models: expected node=, one of 'Group', 'Group.001'",
@@ -847,17 +849,17 @@ def test_functions_take_one_of_several_models(extension, convert):
         api.get_parameters(material, node="Lambert")
     other = api.new_material("lambert")
     with pytest.raises(ValueError, match="is no model of material"):
-        api.get_parameters(material, node=extension.nodes.group_nodes(other)[0])
+        api.get_parameters(material, node=extension.model_nodes.group_nodes(other)[0])
     api.add_albedo(material, node=base.name)
     assert "Albedo" in base.outputs and "Albedo" not in gloss.outputs
     assert "f0" in api.set_substance(material, "gold", node=gloss.name)
     # Forms are those of all, if none is named.
     api.switch_representation(material, "sampled")
-    assert [extension.nodes.identity(n).form for n in (gloss, base)] == ["sampled", "sampled"]
+    assert [extension.model_nodes.identity(n).form for n in (gloss, base)] == ["sampled", "sampled"]
     api.switch_representation(material, "exact", node=base.name)
     with pytest.raises(ValueError, match="no render method 'exact'"):
         api.switch_representation(material, "exact")
-    assert [extension.nodes.identity(n).form for n in (gloss, base)] == ["sampled", "exact"]
+    assert [extension.model_nodes.identity(n).form for n in (gloss, base)] == ["sampled", "exact"]
 
 
 # ---- what Blender ignores ------------------------------------------------------------------------
@@ -915,8 +917,8 @@ def test_a_link_that_blender_ignores_is_no_link(extension, convert, empty, ignor
     after = look(empty, material)
     print(f"{ignore.__name__}: {before} and {after}, said {plan.error}")
     assert after == pytest.approx(before, rel=0.06, abs=0.01)
-    _, base = extension.nodes.group_nodes(material)
-    assert extension.nodes.constants(base)["rho"] is not None
+    _, base = extension.model_nodes.group_nodes(material)
+    assert extension.model_nodes.constants(base)["rho"] is not None
 
 
 def test_a_muted_node_is_not_converted(extension, convert, empty):
@@ -1074,7 +1076,7 @@ def test_what_importers_make_is_converted(extension, convert, imported, models):
     assert not plan.refusal and len(plan.parts) == models
     assert not plan.glows and not plan.transparent
     assert convert.apply([plan]) == 1
-    assert len(extension.nodes.group_nodes(material)) == models
+    assert len(extension.model_nodes.group_nodes(material)) == models
 
 
 def is_half_metal(material, node):
@@ -1149,22 +1151,22 @@ def test_back_where_the_node_of_a_mix_is_gone_is_a_twin_of_each(extension, conve
     is_half_metal(material, node)
     assert convert.apply(convert.plan([material])) == 1
     material.node_tree.nodes.remove(node)
-    groups = extension.nodes.group_nodes(material)
+    groups = extension.model_nodes.group_nodes(material)
     assert len(groups) == 3
-    before = [extension.nodes.identity(g) for g in groups]
+    before = [extension.model_nodes.identity(g) for g in groups]
     with pytest.raises(ValueError, match="Blender Nodes is only for"):
         convert.restore(material)
-    assert [extension.nodes.identity(g) for g in groups] == before
+    assert [extension.model_nodes.identity(g) for g in groups] == before
     for group in groups:
-        model = extension.pack.model(extension.nodes.identity(group).model)
+        model = extension.pack.model(extension.model_nodes.identity(group).model)
         for name, parameter in model.parameters.items():
             default = parameter["default"]
-            extension.nodes.set_value(
+            extension.model_nodes.set_value(
                 group, name, tuple(default) if isinstance(default, list) else default
             )
     assert convert.restore(material) == 1
-    groups = extension.nodes.group_nodes(material)
-    assert [extension.nodes.identity(g).form for g in groups] == ["twin"] * 3
+    groups = extension.model_nodes.group_nodes(material)
+    assert [extension.model_nodes.identity(g).form for g in groups] == ["twin"] * 3
     assert not any(convert.is_converted(g) for g in groups)
 
 
@@ -1337,8 +1339,8 @@ def test_back_where_the_node_of_before_is_gone_is_the_twin(extension, convert):
     assert convert.apply(convert.plan([material])) == 1
     material.node_tree.nodes.remove(node)
     assert convert.restore(material) == 1
-    (group,) = extension.nodes.group_nodes(material)
-    assert extension.nodes.identity(group) == ("lambert", "twin")
+    (group,) = extension.model_nodes.group_nodes(material)
+    assert extension.model_nodes.identity(group) == ("lambert", "twin")
 
 
 def test_the_button_has_a_limit(extension, item):

@@ -106,10 +106,10 @@ def test_what_a_curve_alone_controls_is_a_parameter(extension, convert):
     material, node = material_of("principled", "GGX", Metallic=1.0)
     color_of_metal(node)
     assert convert.apply(convert.plan([material])) == 1
-    (group,) = extension.nodes.group_nodes(material)
-    assert extension.nodes.varying(group) == {"f0"} and not group.inputs[0].is_linked
+    (group,) = extension.model_nodes.group_nodes(material)
+    assert extension.model_nodes.varying(group) == {"f0"} and not group.inputs[0].is_linked
     extension.api.switch_representation(material, "sampled")
-    assert extension.nodes.varying(group) == {"f0"}
+    assert extension.model_nodes.varying(group) == {"f0"}
     assert convert.restore(material) == 1
     assert all(f'"{node.name}"' in path for path, _ in curves(material.node_tree))
 
@@ -118,8 +118,8 @@ def test_glass_keeps_the_keys_of_its_index(extension, convert):
     material, node = material_of("glass", Color=(1.0, 1.0, 1.0))
     keys(node.inputs["IOR"], 1.3, 1.7)
     assert convert.apply(convert.plan([material])) == 1
-    (group,) = extension.nodes.group_nodes(material)
-    assert extension.nodes.varying(group) == {"ior"}
+    (group,) = extension.model_nodes.group_nodes(material)
+    assert extension.model_nodes.varying(group) == {"ior"}
     assert [len(points) for points in curves(material.node_tree).values()] == [2]
 
 
@@ -151,8 +151,8 @@ def test_keys_of_a_material_itself_move_as_well(extension, convert):
     curve = strip.channelbag(data.action_slot, ensure=True).fcurves.new(path)
     curve.keyframe_points.insert(1, 0.5)
     assert convert.apply(convert.plan([material])) == 1
-    (group,) = extension.nodes.group_nodes(material)
-    assert extension.nodes.varying(group) == {"f0"}
+    (group,) = extension.model_nodes.group_nodes(material)
+    assert extension.model_nodes.varying(group) == {"f0"}
     assert convert.restore(material) == 1
     assert all(
         path.startswith('node_tree.nodes["Principled BSDF"]') for path, _ in curves(material)
@@ -285,7 +285,7 @@ def test_keys_in_a_group_move_too(extension, convert):
     before = curves(tree)
     assert convert.apply(convert.plan([material])) == 1
     (group,) = models_in(extension, tree)
-    assert extension.nodes.varying(group) == {"f0"}
+    assert extension.model_nodes.varying(group) == {"f0"}
     assert convert.restore(material) == 1
     assert curves(tree) == before
 

@@ -56,7 +56,7 @@ def nested_in(tree, name):
 
 
 def models_in(extension, tree):
-    return [node for node in tree.nodes if extension.nodes.is_ours(node)]
+    return [node for node in tree.nodes if extension.model_nodes.is_ours(node)]
 
 
 def test_a_node_in_a_group_is_converted_for_all_materials(extension, convert):
@@ -71,18 +71,18 @@ def test_a_node_in_a_group_is_converted_for_all_materials(extension, convert):
     assert extension.api.convert_materials([plan]) == 1
     gloss, base = models_in(extension, tree)
     begin = next(n for n in tree.nodes if n.bl_idname == "NodeGroupInput")
-    (link,) = extension.nodes.sockets(base)["rho"].links
+    (link,) = extension.model_nodes.sockets(base)["rho"].links
     assert (link.from_node, link.from_socket.name) == (begin, "Base Color")
-    assert extension.nodes.varying(gloss) == {"ax", "ay"} and not node.outputs[0].is_linked
+    assert extension.model_nodes.varying(gloss) == {"ax", "ay"} and not node.outputs[0].is_linked
     for material in (car, bike):
-        assert extension.nodes.group_nodes(material) == [gloss, base]
-        assert extension.nodes.shown_nodes(material) == [gloss, base]
+        assert extension.model_nodes.group_nodes(material) == [gloss, base]
+        assert extension.model_nodes.shown_nodes(material) == [gloss, base]
         assert not extension.api.plan_conversion([material])
         assert extension.api.warnings(material, bpy.context.scene) is not None
     # Of one material, for all.
     assert extension.api.convert_back(bike) == 1
-    assert not extension.nodes.group_nodes(car) and {n.name for n in tree.nodes} == before
-    assert not [g for g in bpy.data.node_groups if extension.nodes.TAG in g]
+    assert not extension.model_nodes.group_nodes(car) and {n.name for n in tree.nodes} == before
+    assert not [g for g in bpy.data.node_groups if extension.model_nodes.TAG in g]
 
 
 @pytest.mark.slow
@@ -141,8 +141,8 @@ def test_every_form_works_in_a_group(extension, convert, empty, kind, color, val
     assert extension.api.convert_materials(plans) == 2
     for material in (inside, outside):
         extension.api.switch_representation(material, form)
-        (node,) = extension.nodes.group_nodes(material)
-        assert extension.nodes.identity(node).form == form
+        (node,) = extension.model_nodes.group_nodes(material)
+        assert extension.model_nodes.identity(node).form == form
     seen = [np.array(flat(empty, m)) for m in (inside, outside)]
     print(seen)
     assert seen[0] == pytest.approx(seen[1], rel=2e-3)
@@ -205,7 +205,7 @@ def test_nested_groups_that_are_used_twice(extension, convert, empty):
     extension.api.enable_osl(empty)
     assert extension.api.convert_materials([plan]) == 1
     (model,) = models_in(extension, inner)
-    assert extension.nodes.group_nodes(material) == [model]
+    assert extension.model_nodes.group_nodes(material) == [model]
     assert np.array(flat(empty, material)) == pytest.approx(before, rel=0.02)
     assert extension.api.convert_back(material) == 1
     assert np.array(flat(empty, material)) == pytest.approx(before, rel=1e-3)
@@ -236,10 +236,13 @@ def test_buttons_find_the_nodes_of_groups(extension, convert, empty):
     bpy.context.view_layer.objects.active = helpers.add_sphere(empty, material)
     layout = helpers.Layout()
     extension.ui.draw_material(layout, material, empty)
-    assert extension.nodes.key(inside) == "Paint/Group" and extension.nodes.key(outside) == "Group"
+    assert (
+        extension.model_nodes.key(inside) == "Paint/Group"
+        and extension.model_nodes.key(outside) == "Group"
+    )
     assert bpy.ops.brdfc.switch(node="Paint/Group", representation="sampled") == {"FINISHED"}
-    assert extension.nodes.identity(inside).form == "sampled"
-    assert extension.nodes.identity(outside).form != "sampled"
+    assert extension.model_nodes.identity(inside).form == "sampled"
+    assert extension.model_nodes.identity(outside).form != "sampled"
 
 
 def test_panel_lamps_and_lists_know_the_models_of_groups(extension, convert, empty):
@@ -267,7 +270,7 @@ def test_panel_lamps_and_lists_know_the_models_of_groups(extension, convert, emp
     extension.api.set_parameters(users[0], ax=0.2)
     assert extension.api.get_parameters(users[1])["ax"] == pytest.approx(0.2)
     copy = users[0].copy()
-    assert extension.nodes.group_nodes(copy) == [node]
+    assert extension.model_nodes.group_nodes(copy) == [node]
 
 
 def test_a_group_of_a_library_stays_and_is_said(extension, convert, tmp_path):
@@ -296,7 +299,7 @@ def test_an_animated_input_of_a_group_stays_linked(extension, convert):
     keyed(node.inputs["Roughness"])
     assert convert.apply(convert.plan([material])) == 1
     gloss, _ = models_in(extension, tree)
-    assert extension.nodes.varying(gloss) == {"ax", "ay"}
+    assert extension.model_nodes.varying(gloss) == {"ax", "ay"}
 
 
 def test_a_saved_file_has_the_models_of_a_group(extension, convert, empty, tmp_path):
@@ -311,8 +314,8 @@ def test_a_saved_file_has_the_models_of_a_group(extension, convert, empty, tmp_p
     for osl in (True, False):
         scene.cycles.shading_system = osl
         extension.api.follow_settings(scene)
-        ours = extension.nodes.group_nodes(material)
-        assert len(ours) == 2 and all(map(extension.nodes.runs_anywhere, ours)) != osl
+        ours = extension.model_nodes.group_nodes(material)
+        assert len(ours) == 2 and all(map(extension.model_nodes.runs_anywhere, ours)) != osl
         assert np.array(flat(scene, material)) == pytest.approx(before, rel=0.02, abs=0.005)
     assert extension.api.convert_back(material) == 1
     assert np.array(flat(scene, material)) == pytest.approx(before, rel=1e-3)
@@ -327,7 +330,7 @@ def test_a_lean_group_is_that_of_all_materials(extension, convert, empty, by_the
     (node,) = models_in(extension, tree)
     plan = extension.api.plan()
     assert set(plan.materials) == {"Car", "Bike"}
-    assert extension.api.bake(plan) == 1 and extension.nodes.is_baked(node)
+    assert extension.api.bake(plan) == 1 and extension.model_nodes.is_baked(node)
     assert extension.api.convert_back(users[1]) == 1 and not models_in(extension, tree)
 
 
@@ -353,9 +356,9 @@ def test_a_linked_material_with_a_converted_group_becomes_local(
     for osl in (False, True):
         scene.cycles.shading_system = osl
         extension.api.follow_settings(scene)
-        (node,) = extension.nodes.group_nodes(local)
+        (node,) = extension.model_nodes.group_nodes(local)
         assert node.id_data.library is None and node.node_tree.library is None
-        assert extension.nodes.runs_anywhere(node) != osl
+        assert extension.model_nodes.runs_anywhere(node) != osl
         codes = {found.code for found in extension.api.scene_warnings(scene)}
         assert not codes
         assert np.array(flat(scene, local)) == pytest.approx(before, rel=0.02, abs=0.005)

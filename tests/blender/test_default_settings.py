@@ -40,8 +40,8 @@ def few_samples(scene, samples, size=16):
 
 
 def form_of(extension, material):
-    (node,) = extension.nodes.group_nodes(material)
-    return extension.nodes.identity(node).form
+    (node,) = extension.model_nodes.group_nodes(material)
+    return extension.model_nodes.identity(node).form
 
 
 def update(scene):
@@ -150,8 +150,8 @@ def animated(data):
 def moving_material(extension, model="lambertian_specular"):
     """A material with a link, a driver and an animated value."""
     material = extension.api.new_material(model, rs=0.3)
-    (node,) = extension.nodes.group_nodes(material)
-    found, tree = extension.nodes.sockets(node), material.node_tree
+    (node,) = extension.model_nodes.group_nodes(material)
+    found, tree = extension.model_nodes.sockets(node), material.node_tree
     color = tree.nodes.new("ShaderNodeRGB")
     color.outputs[0].default_value = (0.2, 0.6, 0.3, 1)
     tree.links.new(color.outputs[0], found["rd"])
@@ -205,7 +205,7 @@ def test_a_material_follows_the_scene(extension, new_file):
     np.testing.assert_allclose(pictures[True].mean(), pictures[False].mean(), rtol=5e-3)
     new_file.frame_set(11)
     assert np.abs(render(new_file)[..., :3] - pictures[True]).max() > 0.01
-    groups = [g.name for g in bpy.data.node_groups if extension.nodes.TAG in g]
+    groups = [g.name for g in bpy.data.node_groups if extension.model_nodes.TAG in g]
     assert len(groups) == 2  # its own and the twin's
 
 
@@ -285,7 +285,7 @@ def test_a_choice_that_nodes_lack(extension, new_file):
     add_sphere(new_file, material)
     add_camera(new_file)
     add_world(new_file)
-    (node,) = extension.nodes.group_nodes(material)
+    (node,) = extension.model_nodes.group_nodes(material)
     group = node.node_tree
     assert form_of(extension, material) == "aimed"
     assert [f.code for f in extension.api.warnings(material, new_file)][0] == "osl_off"
@@ -312,7 +312,7 @@ def test_undo(extension, new_file):
 
     def now():
         scene, found = bpy.context.scene, bpy.data.materials[name]
-        (node,) = extension.nodes.group_nodes(found)
+        (node,) = extension.model_nodes.group_nodes(found)
         group = node.node_tree
         return (
             scene.cycles.shading_system,
@@ -333,8 +333,8 @@ def test_undo(extension, new_file):
     push("Start")
     bpy.context.scene.cycles.shading_system = True
     push("On")
-    (node,) = extension.nodes.group_nodes(bpy.data.materials[name])
-    extension.nodes.set_value(node, "rs", 0.5)
+    (node,) = extension.model_nodes.group_nodes(bpy.data.materials[name])
+    extension.model_nodes.set_value(node, "rs", 0.5)
     push("Value")
     bpy.context.scene.cycles.shading_system = False
     push("Off")

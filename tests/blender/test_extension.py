@@ -102,8 +102,8 @@ def test_every_form_compiles_and_renders(extension, every_form, subtests):
         with subtests.test(model=model, representation=representation):
             if isinstance(made, Exception):
                 raise made
-            node = extension.nodes.group_nodes(bpy.data.materials[made])[0]
-            assert extension.nodes.identity(node) == (model, representation)
+            node = extension.model_nodes.group_nodes(bpy.data.materials[made])[0]
+            assert extension.model_nodes.identity(node) == (model, representation)
             script = next(n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeScript")
             found = {s.identifier: s.type for s in script.inputs}
             expected = extension.group_content.expected_inputs(
@@ -148,7 +148,7 @@ def test_sliders_do_not_recompile(extension, every_form, monkeypatch, subtests):
     for (model, representation), made in every_form.made.items():
         with subtests.test(model=model, representation=representation):
             material = bpy.data.materials[made]
-            (node,) = extension.nodes.group_nodes(material)
+            (node,) = extension.model_nodes.group_nodes(material)
             group, before, data = node.node_tree, state(node.node_tree), helpers.counts()
             old, values = extension.api.get_parameters(material), {}
             for name, p in (
@@ -243,7 +243,7 @@ def test_every_choice_reaches_the_shader(extension, empty, few_of, subtests):
         # One material for all: compiling its shader takes longer than rendering.
         material = extension.api.new_material(model, representation)
         helpers.sphere_scene(scene, material, size=16, samples=16)
-        tree = extension.nodes.group_nodes(material)[0].node_tree
+        tree = extension.model_nodes.group_nodes(material)[0].node_tree
         script = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeScript")
         # Different values and broad lobes: otherwise some choices would make no difference.
         for i, number in enumerate(p for p in sockets if p["kind"] == "number"):
@@ -274,8 +274,8 @@ def test_every_choice_reaches_the_shader(extension, empty, few_of, subtests):
 def test_sockets_equal_the_manifest(extension, made_forms, subtests):
     manifest = json.loads((extension.pack.root / "manifest.json").read_text())
     for model, representation, material in made_forms:
-        node = extension.nodes.group_nodes(material)[0]
-        sockets = extension.nodes.sockets(node)
+        node = extension.model_nodes.group_nodes(material)[0]
+        sockets = extension.model_nodes.sockets(node)
         interface = {
             item.identifier: item
             for item in node.node_tree.interface.items_tree
@@ -308,7 +308,7 @@ def test_sockets_equal_the_manifest(extension, made_forms, subtests):
                     assert socket.default_value == label(parameter["default"])
                     for choice in parameter["choices"]:
                         socket.default_value = label(choice)
-                        assert extension.nodes.get_value(node, name) == choice
+                        assert extension.model_nodes.get_value(node, name) == choice
                     with pytest.raises(TypeError):
                         socket.default_value = "No Such Choice"
                 else:
@@ -332,7 +332,7 @@ def test_sockets_equal_the_manifest(extension, made_forms, subtests):
 def test_one_group_a_form(extension, empty):
     first = extension.api.new_material("coupled", r0=0.1)
     second = extension.api.new_material("coupled", r0=0.2)
-    groups = [extension.nodes.group_nodes(m)[0].node_tree for m in (first, second)]
+    groups = [extension.model_nodes.group_nodes(m)[0].node_tree for m in (first, second)]
     assert groups[0] == groups[1]
     assert extension.api.get_parameters(first)["r0"] == pytest.approx(0.1)
     assert extension.api.get_parameters(second)["r0"] == pytest.approx(0.2)
@@ -393,9 +393,9 @@ def test_set_parameters_is_all_or_nothing(extension, empty):
     values = extension.api.get_parameters(material)
     assert values["r0"] == pytest.approx(0.2) and values["rm"] == (0.5, 0.5, 0.5)
     tree = material.node_tree
-    node = extension.nodes.group_nodes(material)[0]
+    node = extension.model_nodes.group_nodes(material)[0]
     number = tree.nodes.new("ShaderNodeValue")
-    tree.links.new(number.outputs[0], extension.nodes.sockets(node)["r0"])
+    tree.links.new(number.outputs[0], extension.model_nodes.sockets(node)["r0"])
     with pytest.raises(ValueError, match="'r0'.*controlled by a link"):
         extension.api.set_parameters(material, r0=0.3)
     with pytest.raises(ValueError, match="has 0 reflection models"):
@@ -462,7 +462,7 @@ def test_shaders_are_short_but_for_outputs_that_were_asked_for(extension, made_f
                 assert len(source) <= longer.get((model, form), 116_000)
             apart = extension.pack.model(model).forms[form].albedo_source()
             assert extension.pack.model(model).forms[form].has_albedo_script == (apart is not None)
-            node = extension.nodes.group_nodes(material)[0]
+            node = extension.model_nodes.group_nodes(material)[0]
             assert [s.script.as_string() for s in scripts_of(node)] == [source]
 
 
@@ -472,19 +472,19 @@ def test_albedo_output_is_added_and_kept_while_it_is_linked(extension, empty):
     api, nodes = extension.api, extension.nodes
     values = {"ax": 0.3, "ks": (0.1, 0.2, 0.3)}
     material, other, third = (api.new_material("ward", "sampled", **values) for _ in "123")
-    tree, node = material.node_tree, nodes.group_nodes(material)[0]
+    tree, node = material.node_tree, extension.model_nodes.group_nodes(material)[0]
     assert [s.name for s in node.outputs] == ["BSDF"]
-    assert not nodes.uses_albedo(node)
+    assert not extension.model_nodes.uses_albedo(node)
     value = tree.nodes.new("ShaderNodeValue")
-    tree.links.new(value.outputs[0], nodes.sockets(node)["ay"])
+    tree.links.new(value.outputs[0], extension.model_nodes.sockets(node)["ay"])
     output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
     whole, before = node.node_tree, helpers.counts()
 
     api.add_albedo(material)
     assert [s.name for s in node.outputs] == ["BSDF", "Albedo"]
-    assert nodes.get_value(node, "ax") == pytest.approx(0.3)
-    assert nodes.get_value(node, "ks") == pytest.approx((0.1, 0.2, 0.3))
-    assert nodes.sockets(node)["ay"].links[0].from_node == value
+    assert extension.model_nodes.get_value(node, "ax") == pytest.approx(0.3)
+    assert extension.model_nodes.get_value(node, "ks") == pytest.approx((0.1, 0.2, 0.3))
+    assert extension.model_nodes.sockets(node)["ay"].links[0].from_node == value
     assert output.inputs["Surface"].links[0].from_node == node
     model, albedo = scripts_of(node)
     assert [s.identifier for s in albedo.outputs] == ["Albedo"]
@@ -495,7 +495,9 @@ def test_albedo_output_is_added_and_kept_while_it_is_linked(extension, empty):
     assert all(s.is_linked for s in albedo.inputs)
     assert nodes.script_problem(node.node_tree) is None
     assert api.warnings(material, empty) == api.warnings(other, empty)
-    assert nodes.group_nodes(other)[0].node_tree == whole, "another material got it too"
+    assert extension.model_nodes.group_nodes(other)[0].node_tree == whole, (
+        "another material got it too"
+    )
 
     full, added = node.node_tree, helpers.counts()
     assert (
@@ -504,7 +506,9 @@ def test_albedo_output_is_added_and_kept_while_it_is_linked(extension, empty):
     api.add_albedo(material)
     assert node.node_tree == full
     api.add_albedo(other)
-    assert nodes.group_nodes(other)[0].node_tree == full and helpers.counts() == added
+    assert (
+        extension.model_nodes.group_nodes(other)[0].node_tree == full and helpers.counts() == added
+    )
     api.add_albedo(third)
     left = helpers.counts()
     assert left["texts"] == before["texts"] + 1 and left["node_groups"] == before["node_groups"]
@@ -525,20 +529,20 @@ def test_albedo_output_is_added_and_kept_while_it_is_linked(extension, empty):
 def test_albedo_output_goes_from_form_to_form(extension, empty):
     """Including a form whose single script provides it, and back."""
     material = extension.api.new_material("coupled", "sampled")
-    tree, node = material.node_tree, extension.nodes.group_nodes(material)[0]
+    tree, node = material.node_tree, extension.model_nodes.group_nodes(material)[0]
     extension.api.add_albedo(material)
     emission = tree.nodes.new("ShaderNodeEmission")
     tree.links.new(node.outputs["Albedo"], emission.inputs["Color"])
     for form, scripts in (("exact", 1), ("sampled", 2)):
         extension.api.switch_representation(material, form)
-        assert extension.nodes.identity(node) == ("coupled", form)
+        assert extension.model_nodes.identity(node) == ("coupled", form)
         assert len(scripts_of(node)) == scripts
         assert emission.inputs["Color"].links[0].from_socket == node.outputs["Albedo"]
 
 
 def test_albedo_output_that_can_not_be_added_changes_nothing(extension, empty, monkeypatch):
     material = extension.api.new_material("ward")
-    node = extension.nodes.group_nodes(material)[0]
+    node = extension.model_nodes.group_nodes(material)[0]
     group, before = node.node_tree, helpers.counts()
     broken = ("broken", BROKEN["does not parse"][0])
     with monkeypatch.context() as patch:
@@ -546,7 +550,7 @@ def test_albedo_output_that_can_not_be_added_changes_nothing(extension, empty, m
         with pytest.raises(extension.api.CompileError, match="the Albedo output: .* failed to"):
             extension.api.add_albedo(material)
     assert node.node_tree == group and helpers.counts() == before
-    group[extension.nodes.TAG]["digest"] = "of an older version"
+    group[extension.model_nodes.TAG]["digest"] = "of an older version"
     with pytest.raises(ValueError, match="of another version of the extension"):
         extension.api.add_albedo(material)
 
@@ -558,7 +562,7 @@ def test_operator_adds_the_albedo_output_where_it_lacks(extension, empty):
     bpy.context.view_layer.objects.active = target
     material = extension.api.new_material("ward")
     mesh.materials.append(material)
-    node = extension.nodes.group_nodes(material)[0]
+    node = extension.model_nodes.group_nodes(material)[0]
 
     def is_offered():
         layout = helpers.Layout()
@@ -577,28 +581,30 @@ def test_switch_keeps_values_and_links(extension, empty):
     parameter = extension.pack.model(model).parameters["rho"]
     material = extension.api.new_material(model, "exact", rho=(0.1, 0.2, 0.3))
     tree = material.node_tree
-    node = extension.nodes.group_nodes(material)[0]
+    node = extension.model_nodes.group_nodes(material)[0]
     bump = tree.nodes.new("ShaderNodeBump")
-    tree.links.new(bump.outputs[0], extension.nodes.sockets(node)["Normal"])
+    tree.links.new(bump.outputs[0], extension.model_nodes.sockets(node)["Normal"])
     output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
     material.cycles.use_bump_map_correction = True
     for form in ("sampled", "exact", "sampled"):
         extension.api.switch_representation(material, form)
-        assert extension.nodes.identity(node) == (model, form)
-        sockets = extension.nodes.sockets(node)
-        assert extension.nodes.get_value(node, parameter["name"]) == pytest.approx((0.1, 0.2, 0.3))
+        assert extension.model_nodes.identity(node) == (model, form)
+        sockets = extension.model_nodes.sockets(node)
+        assert extension.model_nodes.get_value(node, parameter["name"]) == pytest.approx(
+            (0.1, 0.2, 0.3)
+        )
         assert sockets["Normal"].links[0].from_node == bump
         assert output.inputs["Surface"].links[0].from_node == node
     assert material.cycles.use_bump_map_correction is True
     with pytest.raises(ValueError, match="has no render method"):
         extension.api.switch_representation(material, "aimed")
-    assert extension.nodes.identity(node) == (model, "sampled")
+    assert extension.model_nodes.identity(node) == (model, "sampled")
 
 
 def test_group_of_another_version_is_offered_for_update(extension, empty, monkeypatch):
     material = extension.api.new_material("coupled", r0=0.3)
-    node = extension.nodes.group_nodes(material)[0]
-    node.node_tree[extension.nodes.TAG]["digest"] = "of an older version"
+    node = extension.model_nodes.group_nodes(material)[0]
+    node.node_tree[extension.model_nodes.TAG]["digest"] = "of an older version"
     extension.scene_loader.apply_clean_settings(empty)
     assert [w.code for w in extension.api.warnings(material, empty)] == ["outdated"]
     old = node.node_tree
@@ -694,10 +700,10 @@ def test_warning_of_a_parameter_without_effect(extension, empty):
     assert said() == [f"{node}: Latitudinal Glossiness has no effect while Proportion is Paper"], (
         "the other is at its default"
     )
-    (group,) = extension.nodes.group_nodes(material)
+    (group,) = extension.model_nodes.group_nodes(material)
     tree = material.node_tree
     source = tree.nodes.new("ShaderNodeValue")
-    tree.links.new(source.outputs[0], extension.nodes.sockets(group)["ior"])
+    tree.links.new(source.outputs[0], extension.model_nodes.sockets(group)["ior"])
     assert any(f"{node}: IOR has no effect while" in line for line in said())
     extension.api.set_parameters(material, proportion="custom", around="refraction")
     assert said() == []
@@ -1074,7 +1080,7 @@ def test_warnings_of_an_aimed_form_that_is_denoised(extension, empty):
 
 def test_warning_script_failed(extension, empty):
     material = clean(extension, empty)
-    group = extension.nodes.group_nodes(material)[0].node_tree
+    group = extension.model_nodes.group_nodes(material)[0].node_tree
     script = next(n for n in group.nodes if n.bl_idname == "ShaderNodeScript")
     script.inputs.remove(next(s for s in script.inputs if s.identifier == "rho"))
     found = extension.api.warnings(material, empty)
@@ -1084,16 +1090,19 @@ def test_warning_script_failed(extension, empty):
     group.nodes.remove(script)
     assert "no script node" in extension.api.warnings(material, empty)[0].message
     # A broken group is not reused for the next material.
-    assert extension.nodes.group_nodes(extension.api.new_material("lambert"))[0].node_tree != group
+    assert (
+        extension.model_nodes.group_nodes(extension.api.new_material("lambert"))[0].node_tree
+        != group
+    )
 
 
 def test_warning_out_of_range(extension, empty):
     material = clean(extension, empty, "coupled")
-    node = extension.nodes.group_nodes(material)[0]
-    extension.nodes.sockets(node)["r0"].default_value = 1.5
+    node = extension.model_nodes.group_nodes(material)[0]
+    extension.model_nodes.sockets(node)["r0"].default_value = 1.5
     found = extension.api.warnings(material, empty)
     assert [w.code for w in found] == ["out_of_range"] and "1.5" in found[0].message
-    extension.nodes.sockets(node)["r0"].default_value = 1.0
+    extension.model_nodes.sockets(node)["r0"].default_value = 1.0
     assert codes(extension, material, empty) == []
 
 
@@ -1258,12 +1267,12 @@ def test_search_makes_a_node_or_a_material(extension, empty):
     bpy.context.view_layer.objects.active = target
     assert bpy.ops.brdfc.search(model="ward") == {"FINISHED"}
     material = target.active_material
-    assert [extension.nodes.identity(n).model for n in extension.nodes.group_nodes(material)] == [
-        "ward"
-    ]
+    assert [
+        extension.model_nodes.identity(n).model for n in extension.model_nodes.group_nodes(material)
+    ] == ["ward"]
     with shader_editor(material):
         assert bpy.ops.brdfc.search(model="glass") == {"FINISHED"}
-    assert len(extension.nodes.group_nodes(material)) == 2
+    assert len(extension.model_nodes.group_nodes(material)) == 2
     assert target.active_material == material
 
 
@@ -1284,7 +1293,9 @@ def test_panel_shows_model_form_values_and_warnings(extension, made_forms, subte
                 native = {"nodes": "Formula Nodes", "twin": "Blender Nodes"}
                 label = native.get(form, form.capitalize())
                 assert f"operator brdfc.switch {label}" in text
-            _, shown = extension.nodes.identity(extension.nodes.group_nodes(material)[0])
+            _, shown = extension.model_nodes.identity(
+                extension.model_nodes.group_nodes(material)[0]
+            )
             form = extension.pack.model(model).forms[shown]
             for parameter in form.socket_parameters.values():
                 assert f"value {parameter['label']}:" in text
@@ -1344,12 +1355,15 @@ def test_panel_shows_costs_of_forms_made_of_a_fit(extension, empty, lean_pack, s
 
 
 def test_a_form_that_lacks_a_choice_is_refused_and_auto_takes_another(extension, empty):
-    api, pack, nodes = extension.api, extension.pack, extension.nodes
+    api, pack = extension.api, extension.pack
     only = "'exact' only for fresnel='schlick', not for 'dielectric'"
     with pytest.raises(ValueError, match=only):
         api.new_material("coupled", "exact", fresnel="dielectric")
     material = api.new_material("coupled", fresnel="dielectric", r0=0.1)
-    assert nodes.identity(nodes.group_nodes(material)[0]) == ("coupled", "aimed")
+    assert extension.model_nodes.identity(extension.model_nodes.group_nodes(material)[0]) == (
+        "coupled",
+        "aimed",
+    )
     with pytest.raises(ValueError, match=only):
         api.switch_representation(material, "exact")
     assert api.get_parameters(material)["fresnel"] == "dielectric"
@@ -1360,7 +1374,10 @@ def test_a_form_that_lacks_a_choice_is_refused_and_auto_takes_another(extension,
     assert "operator brdfc.switch Sampled" in text
     api.set_parameters(material, fresnel="schlick")
     api.switch_representation(material, "auto")
-    assert nodes.identity(nodes.group_nodes(material)[0]) == ("coupled", "exact")
+    assert extension.model_nodes.identity(extension.model_nodes.group_nodes(material)[0]) == (
+        "coupled",
+        "exact",
+    )
     assert api.get_parameters(material)["fresnel"] == "schlick"
     with pytest.raises(ValueError, match=only):
         api.set_parameters(material, fresnel="dielectric")
@@ -1370,9 +1387,9 @@ def test_a_form_that_lacks_a_choice_is_refused_and_auto_takes_another(extension,
 def test_panel_says_why_there_is_no_albedo(extension, empty):
     material = extension.api.new_material("coupled")
     tree = material.node_tree
-    node = extension.nodes.group_nodes(material)[0]
+    node = extension.model_nodes.group_nodes(material)[0]
     tree.links.new(
-        tree.nodes.new("ShaderNodeValue").outputs[0], extension.nodes.sockets(node)["r0"]
+        tree.nodes.new("ShaderNodeValue").outputs[0], extension.model_nodes.sockets(node)["r0"]
     )
     assert "Normal Reflectance" in extension.ui.energy_text(node)
 
@@ -1385,8 +1402,8 @@ def test_operator_new_material(extension, empty):
     model, form = "phong", "fitted"
     assert bpy.ops.brdfc.new_material(model=model, representation=form) == {"FINISHED"}
     material = target.active_material
-    node = extension.nodes.group_nodes(material)[0]
-    assert extension.nodes.identity(node) == (model, form)
+    node = extension.model_nodes.group_nodes(material)[0]
+    assert extension.model_nodes.identity(node) == (model, form)
     assert material.cycles.use_bump_map_correction is False
     assert bpy.ops.brdfc.enable_osl() == {"FINISHED"}
     assert empty.cycles.shading_system is True
@@ -1445,7 +1462,7 @@ def test_new_material_of_all_that_has_a_surface(extension, empty):
         empty.collection.objects.link(item)
         bpy.context.view_layer.objects.active = item
         assert bpy.ops.brdfc.new_material(model="lambert") == {"FINISHED"}
-        assert extension.nodes.group_nodes(item.active_material)
+        assert extension.model_nodes.group_nodes(item.active_material)
 
 
 def test_operator_switch(extension, empty):
@@ -1455,10 +1472,10 @@ def test_operator_switch(extension, empty):
     bpy.context.view_layer.objects.active = target
     first, second = (extension.api.new_material("lambert", "exact") for _ in range(2))
     mesh.materials.append(first)
-    name = extension.nodes.group_nodes(first)[0].name
+    name = extension.model_nodes.group_nodes(first)[0].name
 
     def form(material):
-        return extension.nodes.identity(extension.nodes.group_nodes(material)[0]).form
+        return extension.model_nodes.identity(extension.model_nodes.group_nodes(material)[0]).form
 
     bpy.ops.brdfc.switch(node=name, representation="sampled")
     assert (form(first), form(second)) == ("sampled", "exact")
@@ -1480,7 +1497,7 @@ def drawn(extension, empty):
     bpy.context.view_layer.objects.active = target
     curve = material.node_tree.nodes.new("ShaderNodeFloatCurve")
     draw(curve, 0.5, 0.4, 0.3, 0.05)
-    return extension.nodes.group_nodes(material)[0], curve
+    return extension.model_nodes.group_nodes(material)[0], curve
 
 
 def draw(curve, *heights):
@@ -1497,7 +1514,7 @@ def draw(curve, *heights):
 
 def kernel_of(extension, node):
     names = ("kernel", "h0", "h1", "h2", "h3")
-    return [extension.nodes.get_value(node, name) for name in names]
+    return [extension.model_nodes.get_value(node, name) for name in names]
 
 
 def test_kernel_from_a_float_curve(extension, drawn):
@@ -1539,7 +1556,7 @@ def test_kernel_says_what_is_wrong_with_a_curve(extension, drawn):
     with pytest.raises(ValueError, match="expected a node of the model 'lossless'"):
         extension.api.set_kernel(curve, curve)
     value = tree.nodes.new("ShaderNodeValue")
-    link = tree.links.new(value.outputs[0], extension.nodes.sockets(node)["h2"])
+    link = tree.links.new(value.outputs[0], extension.model_nodes.sockets(node)["h2"])
     with pytest.raises(RuntimeError, match="'h2' .* controlled by a link"):
         bpy.ops.brdfc.kernel()
     tree.links.remove(link)
@@ -1569,7 +1586,7 @@ def test_operator_add_node(extension, empty):
         assert bpy.types.NODE_PT_brdfc.poll(bpy.context) is False
         assert bpy.ops.brdfc.add_node(model="coupled") == {"FINISHED"}
         assert bpy.types.NODE_PT_brdfc.poll(bpy.context) is True
-    assert len(extension.nodes.group_nodes(material)) == 1
+    assert len(extension.model_nodes.group_nodes(material)) == 1
 
 
 def test_disable_leaves_nothing_behind(extension, empty):

@@ -119,7 +119,7 @@ def test_no_material_is_an_error_that_says_so(extension, empty, given):
 def test_no_scene_node_or_plan_is_an_error_that_says_so(extension, empty, given):
     api = extension.api
     material = api.new_material("lossless")
-    (node,) = extension.nodes.group_nodes(material)
+    (node,) = extension.model_nodes.group_nodes(material)
     for call, what in (
         (lambda: api.warnings(material, given), "a scene"),
         (lambda: api.scene_warnings(given), "a scene"),
@@ -316,7 +316,7 @@ def test_linked_materials_aim_at_their_own_files_lamps(extension, empty, tmp_pat
     material = bpy.context.object.active_material
     assert material.library is None
     assert found(extension, material, scene) == {}
-    (node,) = extension.nodes.group_nodes(material)
+    (node,) = extension.model_nodes.group_nodes(material)
     assert node.node_tree.library is None
     lamps = import_module(f"{extension.package}.lamps")
     (shared,) = [
@@ -348,7 +348,7 @@ def test_what_is_wrong_with_several_nodes_is_said_once(extension, empty):
     extension.scene_loader.apply_clean_settings(empty)
     empty.cycles.sample_clamp_indirect = empty.cycles.sample_clamp_direct = 3.0
     for material in made:
-        ours = extension.nodes.group_nodes(material)
+        ours = extension.model_nodes.group_nodes(material)
         names = ", ".join(dict.fromkeys(node.label or node.name for node in ours))
         clamped = [
             (f.code, f.message)
@@ -511,7 +511,7 @@ def test_a_render_without_osl_says_so_once(extension, empty, capsys, monkeypatch
     empty.cycles.device = "GPU"
     glass = extension.api.new_material("glass", "exact")
     lean = extension.api.new_material("lambert", "exact")
-    (node,) = extension.nodes.group_nodes(lean)
+    (node,) = extension.model_nodes.group_nodes(lean)
     node.node_tree.nodes.remove(node.node_tree.nodes["Runs"])
     for made in (glass, lean):
         bpy.data.objects["Sphere"].data.materials.append(made)

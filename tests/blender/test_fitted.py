@@ -181,8 +181,8 @@ def test_forms_of_the_extension_along_their_sliders(extension, tool):
     varying = extension.api.new_material("blinn", "fitted", **of_blinn[0][2])
     attribute = varying.node_tree.nodes.new("ShaderNodeAttribute")
     attribute.attribute_name = "shininess"
-    (node,) = extension.nodes.group_nodes(varying)
-    varying.node_tree.links.new(attribute.outputs["Fac"], extension.nodes.sockets(node)["e"])
+    (node,) = extension.model_nodes.group_nodes(varying)
+    varying.node_tree.links.new(attribute.outputs["Fac"], extension.model_nodes.sockets(node)["e"])
 
     rng = np.random.default_rng(5)
     what = [case for case in cases for _ in range(FACETS)] + of_blinn * (FACETS // 2)
@@ -212,11 +212,11 @@ def test_forms_of_the_extension_along_their_sliders(extension, tool):
 
 def test_a_number_beyond_its_slider_is_warned_of(extension, empty):
     material = extension.api.new_material("blinn", "fitted")
-    (node,) = extension.nodes.group_nodes(material)
+    (node,) = extension.model_nodes.group_nodes(material)
     end = extension.pack.model("blinn").forms["fitted"].entry["axis"]["max"]
 
     def codes(value):
-        extension.nodes.set_value(node, "e", value)
+        extension.model_nodes.set_value(node, "e", value)
         return [f.code for f in extension.checks.warnings(material, empty)]
 
     assert "out_of_fit" not in codes(end)
@@ -225,12 +225,12 @@ def test_a_number_beyond_its_slider_is_warned_of(extension, empty):
 
 def test_a_fit_has_defaults_but_for_its_number_and_factors(extension, empty):
     """Other values are refused with the reason, and nothing changes."""
-    api, pack, nodes = extension.api, extension.pack, extension.nodes
+    api, pack = extension.api, extension.pack
     only = pack.model("lafortune").forms["fitted"].only
     assert only == {"cxy": -1, "cz": 0.8}
     material = api.new_material("lafortune", "fitted", e=8.0, ks=(0.5, 0.25, 1.0))
-    (node,) = nodes.group_nodes(material)
-    assert set(nodes.sockets(node)) == {"e", "ks", "Normal", "Tangent"}
+    (node,) = extension.model_nodes.group_nodes(material)
+    assert set(extension.model_nodes.sockets(node)) == {"e", "ks", "Normal", "Tangent"}
     values = api.get_parameters(material)
     assert {name: values[name] for name in only} == only
     with pytest.raises(ValueError, match="'fitted' only for cz=0.8, not for 0.5"):
@@ -246,20 +246,20 @@ def test_a_fit_has_defaults_but_for_its_number_and_factors(extension, empty):
     api.set_parameters(material, cz=0.5)
     with pytest.raises(ValueError, match="only for cz=0.8, not for 0.5"):
         api.switch_representation(material, "fitted")
-    assert nodes.identity(node) == ("lafortune", "sampled")
+    assert extension.model_nodes.identity(node) == ("lafortune", "sampled")
     api.set_parameters(material, cz=0.8)
     value = material.node_tree.nodes.new("ShaderNodeValue")
-    material.node_tree.links.new(value.outputs[0], nodes.sockets(node)["cz"])
+    material.node_tree.links.new(value.outputs[0], extension.model_nodes.sockets(node)["cz"])
     with pytest.raises(ValueError, match="only for cz=0.8, not for a linked or animated value"):
         api.switch_representation(material, "fitted")
-    assert nodes.sockets(node)["cz"].is_linked
+    assert extension.model_nodes.sockets(node)["cz"].is_linked
 
 
 @pytest.fixture
 def textured(extension, use_pack):
     """A material with a texture as its colour, in the fitted form of a pack made for it as by a
     user; and a white one of the same model."""
-    api, nodes = extension.api, extension.nodes
+    api = extension.api
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     extension.scene_loader.apply_clean_settings(bpy.context.scene, max_bounces=0)
     made = [api.new_material("phong", "sampled", e=40.0, ks=1.0) for _ in range(2)]
@@ -268,15 +268,20 @@ def textured(extension, use_pack):
     image.pixels.foreach_set(np.insert(TEXELS, 3, 1, axis=1).astype(np.float32).ravel())
     picture = tree.nodes.new("ShaderNodeTexImage")
     picture.image, picture.interpolation = image, "Closest"
-    node = nodes.group_nodes(made[0])[0]
-    tree.links.new(picture.outputs["Color"], nodes.sockets(node)["ks"])
+    node = extension.model_nodes.group_nodes(made[0])[0]
+    tree.links.new(picture.outputs["Color"], extension.model_nodes.sockets(node)["ks"])
     used = api.used_materials()
     assert [m["parameters"]["ks"] for m in used.values()] == [{"varies": True}, [1, 1, 1]]
     use_pack(used, "--error", "10")
     for material in made:
         api.switch_representation(material, "fitted")
-        assert nodes.identity(nodes.group_nodes(material)[0]) == ("phong", "fitted")
-    assert nodes.sockets(nodes.group_nodes(made[0])[0])["ks"].is_linked
+        assert extension.model_nodes.identity(extension.model_nodes.group_nodes(material)[0]) == (
+            "phong",
+            "fitted",
+        )
+    assert extension.model_nodes.sockets(extension.model_nodes.group_nodes(made[0])[0])[
+        "ks"
+    ].is_linked
     return made
 
 

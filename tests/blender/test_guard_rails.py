@@ -63,8 +63,8 @@ def test_without_osl_models_are_blenders_own_nodes(extension, empty, monkeypatch
     empty.update_tag()
     bpy.context.view_layer.update()
     for material in (automatic, *made):
-        (node,) = extension.nodes.group_nodes(material)
-        assert extension.nodes.identity(node).form == "nodes"
+        (node,) = extension.model_nodes.group_nodes(material)
+        assert extension.model_nodes.identity(node).form == "nodes"
         assert extension.checks.warnings(material, empty) == []
     assert extension.api.get_parameters(automatic)["e"] == pytest.approx(20)
     kept = len(bpy.data.node_groups), len(bpy.data.texts), len(bpy.data.materials)
@@ -124,14 +124,14 @@ def test_every_button_is_an_operator_with_these_settings(extension):
 
 def aged(extension, material, made_by="brdfc 0.0.1"):
     """Makes the material look like one of another version."""
-    (node,) = extension.nodes.group_nodes(material)
-    tag = node.node_tree[extension.nodes.TAG]
+    (node,) = extension.model_nodes.group_nodes(material)
+    tag = node.node_tree[extension.model_nodes.TAG]
     tag["digest"], tag["made_by"] = "of another version", made_by
     return node
 
 
 def test_materials_of_an_older_version_are_updated_at_once(extension, empty, phong):
-    api, nodes = extension.api, extension.nodes
+    api = extension.api
     other = api.new_material("ward", "sampled", ax=0.25, normalisation="duer")
     old = [aged(extension, phong), aged(extension, other)]
     groups = [node.node_tree for node in old]
@@ -142,7 +142,7 @@ def test_materials_of_an_older_version_are_updated_at_once(extension, empty, pho
     assert api.get_parameters(phong)["e"] == pytest.approx(20)
     assert api.get_parameters(other)["ax"] == pytest.approx(0.25)
     assert api.get_parameters(other)["normalisation"] == "duer"
-    assert nodes.identity(old[1]) == ("ward", "sampled")
+    assert extension.model_nodes.identity(old[1]) == ("ward", "sampled")
     assert shown(extension, phong, empty) == []
     del groups
     assert len(bpy.data.node_groups) == 5, "the old groups are gone; two models with twins, lamps"
@@ -183,14 +183,14 @@ def lose_a_choice(tag):
     ],
 )
 def test_what_would_be_lost_is_said_and_kept(extension, empty, lose, why):
-    api, nodes = extension.api, extension.nodes
+    api = extension.api
     material = api.new_material("ward", normalisation="duer")
     kept = api.new_material("ward")
     node = aged(extension, material)
-    if kept_node := nodes.group_nodes(kept):
+    if kept_node := extension.model_nodes.group_nodes(kept):
         assert kept_node[0].node_tree == node.node_tree, "one group serves both"
     group = node.node_tree
-    lose(group[nodes.TAG])
+    lose(group[extension.model_nodes.TAG])
     if (
         lose is lose_a_choice
         and import_module(f"{extension.package}.content.group_sockets").has_menus()
@@ -206,19 +206,19 @@ def test_what_would_be_lost_is_said_and_kept(extension, empty, lose, why):
 
 def test_a_form_that_is_no_more_becomes_another(extension, empty, phong):
     node = aged(extension, phong)
-    node.node_tree[extension.nodes.TAG]["representation"] = "perfect"
+    node.node_tree[extension.model_nodes.TAG]["representation"] = "perfect"
     result = extension.api.update_materials()
     assert result.count == 1 and "Perfect is now Aimed" in result.notes[0]
-    assert extension.nodes.identity(node) == ("phong", "aimed")
+    assert extension.model_nodes.identity(node) == ("phong", "aimed")
     assert extension.api.get_parameters(phong)["e"] == pytest.approx(20)
 
 
 def test_files_are_updated_when_they_are_opened_if_the_preferences_say_so(
     extension, empty, phong, tmp_path
 ):
-    api, nodes = extension.api, extension.nodes
+    api = extension.api
     lost = api.new_material("ward")
-    lose_a_parameter(aged(extension, lost).node_tree[nodes.TAG])
+    lose_a_parameter(aged(extension, lost).node_tree[extension.model_nodes.TAG])
     aged(extension, phong)
     names = phong.name, lost.name
     for material in (phong, lost):
@@ -279,7 +279,7 @@ def test_what_is_cut_to_a_file_never_replaces_the_whole(extension, empty, phong,
         assert extension.pack.manifest()["hash"] == whole
         assert shown(extension, phong, empty) == []
         assert bpy.ops.brdfc.switch(
-            node=extension.nodes.group_nodes(phong)[0].name, representation="sampled"
+            node=extension.model_nodes.group_nodes(phong)[0].name, representation="sampled"
         ) == {"FINISHED"}
     finally:
         bpy.ops.extensions.package_uninstall(

@@ -53,7 +53,7 @@ def described(tree, seen=None):
 
 
 def formulas(material, extension):
-    (node,) = extension.nodes.group_nodes(material)
+    (node,) = extension.model_nodes.group_nodes(material)
     (inner,) = (n.node_tree for n in node.node_tree.nodes if n.label == "Formulas")
     return inner
 

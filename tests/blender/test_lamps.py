@@ -138,7 +138,7 @@ def test_model_groups_are_fed_by_the_one_group(extension, ball, aimed):
     extension.api.new_material(others[-1], form)
     (shared,) = [g for g in bpy.data.node_groups if g.name.startswith("brdfc Lamps")]
     count = extension.pack.model(aimed[0]).forms[aimed[1]].entry["lamps"]
-    node = extension.nodes.group_nodes(ball.active_material)[0]
+    node = extension.model_nodes.group_nodes(ball.active_material)[0]
     script = next(n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeScript")
     fed = {s.identifier: s.links[0] for s in script.inputs if s.identifier.startswith("Lamp")}
     assert len(fed) == 4 * count
@@ -374,7 +374,7 @@ def test_copies_of_the_group_give_way(extension, shared_group, ball, empty, aime
     assert_lamps(slots(scene), [lamp])
     (group,) = [g for g in bpy.data.node_groups if shared_group.TAG in g]
     for material in (own, to.materials[0]):
-        (node,) = extension.nodes.group_nodes(material)
+        (node,) = extension.model_nodes.group_nodes(material)
         inner = [n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeGroup"]
         (inner,) = [n for n in inner if shared_group.TAG in n.node_tree]
         assert inner.node_tree == group

@@ -28,7 +28,7 @@ def used(extension, empty, kept_program, monkeypatch):
     node = the_node(extension, made["ward"])
     value = made["ward"].node_tree.nodes.new("ShaderNodeValue")
     value.outputs[0].default_value = 0.5
-    made["ward"].node_tree.links.new(value.outputs[0], extension.nodes.sockets(node)["ay"])
+    made["ward"].node_tree.links.new(value.outputs[0], extension.model_nodes.sockets(node)["ay"])
     for material in made.values():
         # An output that is not linked would be left out anyway.
         extension.api.add_albedo(material)
@@ -39,7 +39,7 @@ def used(extension, empty, kept_program, monkeypatch):
 
 
 def the_node(extension, material):
-    (node,) = extension.nodes.group_nodes(material)
+    (node,) = extension.model_nodes.group_nodes(material)
     return node
 
 
@@ -61,7 +61,7 @@ def picture(extension, material):
 
 @pytest.mark.slow
 def test_lean_materials_show_the_same_and_hold_less(extension, used, tmp_path):
-    api, nodes = extension.api, extension.nodes
+    api = extension.api
     values = {model: api.get_parameters(m) for model, m in used.items()}
     listed = api.used_materials()
     pictures = {model: picture(extension, m) for model, m in used.items()}
@@ -84,12 +84,12 @@ def test_lean_materials_show_the_same_and_hold_less(extension, used, tmp_path):
     free = {"radziszewski_alda": set(), "ward": {"ay"}, "coupled": set()}
     for model, material in used.items():
         node = the_node(extension, material)
-        assert nodes.is_baked(node)
-        assert set(nodes.sockets(node)) == free[model] | {"Normal", "Tangent"}
+        assert extension.model_nodes.is_baked(node)
+        assert set(extension.model_nodes.sockets(node)) == free[model] | {"Normal", "Tangent"}
         # In coupled's short text, a table of three colours replaces a colour.
         part = 1.1 if model == "coupled" else 0.5
         assert len(source(extension, material)) < part * sizes[model]
-        assert nodes.uses_albedo(node)
+        assert extension.model_nodes.uses_albedo(node)
         found = api.get_parameters(material)
         assert found.keys() == values[model].keys()
         for name, value in found.items():
@@ -99,7 +99,7 @@ def test_lean_materials_show_the_same_and_hold_less(extension, used, tmp_path):
         after = picture(extension, material)
         centre = (slice(8, 16), slice(8, 16))
         assert after[centre].mean() == pytest.approx(pictures[model][centre].mean(), rel=0.05)
-    assert nodes.sockets(the_node(extension, used["ward"]))["ay"].is_linked
+    assert extension.model_nodes.sockets(the_node(extension, used["ward"]))["ay"].is_linked
     assert api.used_materials().keys() == listed.keys()
     for name, entry in api.used_materials().items():
         assert entry["parameters"] == listed[name]["parameters"]
@@ -109,7 +109,7 @@ def test_lean_materials_show_the_same_and_hold_less(extension, used, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.open_mainfile(filepath=str(path))
     material = bpy.data.materials["Coupled Matte/Specular"]
-    assert nodes.is_baked(the_node(extension, material))
+    assert extension.model_nodes.is_baked(the_node(extension, material))
     assert picture(extension, material)[8:16, 8:16].mean() == pytest.approx(
         pictures["coupled"][8:16, 8:16].mean(), rel=0.05
     )
@@ -147,7 +147,7 @@ def test_a_farm_renders_a_lean_file_and_its_moving_lamp(
 
 
 def test_a_lean_material_is_current_and_goes_back(extension, used, empty):
-    api, nodes = extension.api, extension.nodes
+    api = extension.api
     material = used["coupled"]
     before = api.get_parameters(material)
     extension.api.enable_osl(empty)
@@ -163,8 +163,8 @@ def test_a_lean_material_is_current_and_goes_back(extension, used, empty):
         api.set_parameters(material, r0=0.2)
     api.set_parameters(material, r0=0.1)
     api.switch_representation(material, "sampled")
-    assert not nodes.is_baked(the_node(extension, material))
-    assert nodes.identity(the_node(extension, material)) == ("coupled", "sampled")
+    assert not extension.model_nodes.is_baked(the_node(extension, material))
+    assert extension.model_nodes.identity(the_node(extension, material)) == ("coupled", "sampled")
     for name, value in api.get_parameters(material).items():
         same = value if isinstance(value, str) else pytest.approx(value, rel=1e-6)
         assert before[name] == same
@@ -173,7 +173,7 @@ def test_a_lean_material_is_current_and_goes_back(extension, used, empty):
 
 @pytest.mark.slow
 def test_a_budget_takes_a_fit_in_place_of_drawing(extension, empty, kept_program):
-    api, nodes = extension.api, extension.nodes
+    api = extension.api
     preferences = bpy.context.preferences.addons[extension.package].preferences
     preferences.program = str(kept_program)
     try:
@@ -182,8 +182,8 @@ def test_a_budget_takes_a_fit_in_place_of_drawing(extension, empty, kept_program
     finally:
         preferences.program = ""
     node = the_node(extension, material)
-    assert nodes.identity(node) == ("phong", "fitted")
-    assert nodes.is_baked(node)
+    assert extension.model_nodes.identity(node) == ("phong", "fitted")
+    assert extension.model_nodes.is_baked(node)
     assert api.get_parameters(material)["e"] == pytest.approx(40)
     assert np.isfinite(picture(extension, material)).all()
 
@@ -362,7 +362,7 @@ def test_plan_and_bake_go_on_beside_the_interface(extension, used, manager):
     apply = Stand(extension.operators.BRDFC_OT_bake_apply)
     assert run_through(apply, manager.context, extension.api.start_bake(plan)) == {"FINISHED"}
     assert apply.finished == 3
-    assert all(extension.nodes.is_baked(the_node(extension, m)) for m in used.values())
+    assert all(extension.model_nodes.is_baked(the_node(extension, m)) for m in used.values())
     assert any(0 < t < 100 for t in manager.told if isinstance(t, float))
 
 

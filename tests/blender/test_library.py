@@ -244,8 +244,8 @@ FORMS = {True: ("auto", "twin"), False: ("auto", "nodes", "twin")}
 def assert_aims_at(extension, material, lamp):
     """Checks that the lamp group in the material's model contains the lamp's position."""
     bpy.context.view_layer.update()
-    (node,) = extension.nodes.group_nodes(material)
-    content = extension.nodes.content_group(node.node_tree)
+    (node,) = extension.model_nodes.group_nodes(material)
+    content = extension.model_nodes.content_group(node.node_tree)
     inner = {getattr(n, "node_tree", None): n for n in content.nodes}
     inner = inner[bpy.data.node_groups["brdfc Lamps"]]
     group = inner.node_tree.evaluated_get(bpy.context.evaluated_depsgraph_get())
@@ -292,11 +292,11 @@ def test_dragging_brings_nothing_twice_and_finds_the_lamps(
 
 def test_a_group_that_differs_does_not_give_way(extension, made, empty):
     mine = extension.api.new_material("ward")
-    (node,) = extension.nodes.group_nodes(mine)
-    tag = node.node_tree[extension.nodes.TAG]
+    (node,) = extension.model_nodes.group_nodes(mine)
+    tag = node.node_tree[extension.model_nodes.TAG]
     tag["digest"] = "of another version"
     other = drag(made, "Brushed Steel")
-    (theirs,) = extension.nodes.group_nodes(other)
+    (theirs,) = extension.model_nodes.group_nodes(other)
     assert theirs.node_tree != node.node_tree
     assert len([g for g in bpy.data.node_groups if g.name.startswith("brdfc Lamps")]) == 1
 
@@ -307,7 +307,7 @@ def test_what_is_asked_for_by_name_stays(extension, made, empty):
     with bpy.data.libraries.load(str(made.blend)) as (there, here):
         here.node_groups = [name for name in there.node_groups if name == "Ward (auto)"]
     (group,) = here.node_groups
-    assert group.name == "Ward (auto).001" and extension.nodes.TAG in group
+    assert group.name == "Ward (auto).001" and extension.model_nodes.TAG in group
 
 
 def test_undo_of_a_drag(extension, made, empty):
@@ -341,9 +341,11 @@ def test_every_material_is_as_the_same_one_made_by_hand(
         with subtests.test(entry.name):
             dragged = drag(made, entry.name)
             by_hand = library.make(extension.api, entry)
-            (theirs,), (ours,) = map(extension.nodes.group_nodes, (dragged, by_hand))
+            (theirs,), (ours,) = map(extension.model_nodes.group_nodes, (dragged, by_hand))
             assert theirs.node_tree == ours.node_tree, "the same shader, once"
-            assert extension.nodes.all_values(theirs) == extension.nodes.all_values(ours)
+            assert extension.model_nodes.all_values(theirs) == extension.model_nodes.all_values(
+                ours
+            )
             for settings in ("use_bump_map_correction", "use_transparent_shadow"):
                 mine = [getattr(m, settings, None) for m in (dragged.cycles, by_hand.cycles)]
                 assert mine[0] == mine[1]

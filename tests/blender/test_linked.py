@@ -72,8 +72,8 @@ def foreign(library, request):
 
 
 def state(extension, material):
-    (node,) = extension.nodes.group_nodes(material)
-    return extension.nodes.identity(node), extension.nodes.all_values(node)
+    (node,) = extension.model_nodes.group_nodes(material)
+    return extension.model_nodes.identity(node), extension.model_nodes.all_values(node)
 
 
 def reopened(tmp_path):
@@ -163,11 +163,11 @@ def test_all_materials_are_all_that_can_be_changed(extension, foreign):
     before = state(extension, theirs)
     own = [extension.api.new_material("phong", "sampled") for _ in range(2)]
     put_on_a_ball(own[0])
-    shown = [extension.nodes.group_nodes(material)[0] for material in own]
+    shown = [extension.model_nodes.group_nodes(material)[0] for material in own]
     assert bpy.ops.brdfc.switch(node="Group", representation="aimed", all_users=True) == {
         "FINISHED"
     }
-    assert [extension.nodes.identity(node).form for node in shown] == ["aimed", "aimed"]
+    assert [extension.model_nodes.identity(node).form for node in shown] == ["aimed", "aimed"]
     assert state(extension, theirs) == before
     names = [g.name for g in bpy.data.node_groups if g.library is None]
     assert not [name for name in names if "sampled" in name], "no group stays behind"
@@ -185,7 +185,7 @@ def test_a_linked_group_in_the_files_own_material(extension, library):
     bpy.data.libraries.write(str(path), {inner}, fake_user=True)
     tree.nodes[0].node_tree = linked(path, "node_groups", "inner")
     put_on_a_ball(material)
-    (node,) = extension.nodes.group_nodes(material)
+    (node,) = extension.model_nodes.group_nodes(material)
     assert node.id_data.library is not None
     with pytest.raises(ValueError, match=r"'inner' is linked from .*group\.blend"):
         extension.api.switch_representation(material, "aimed")
@@ -203,7 +203,7 @@ def changed_and_kept(extension, tmp_path):
     assert bpy.ops.brdfc.make_local() == {"FINISHED"}
     material = bpy.context.object.active_material
     extension.api.set_parameters(material, e=30.0)
-    (node,) = extension.nodes.group_nodes(material)
+    (node,) = extension.model_nodes.group_nodes(material)
     assert bpy.ops.brdfc.switch(node=node.name, representation="aimed") == {"FINISHED"}
     name = bpy.context.object.name
     reopened(tmp_path)
@@ -238,7 +238,7 @@ def test_a_script_makes_the_material_of_a_linked_object_local(extension, library
     material = extension.api.make_local(theirs)
     assert material.library is None and item.data.materials[0] == theirs != material
     assert state(extension, theirs) == before
-    (node,) = extension.nodes.group_nodes(material)
+    (node,) = extension.model_nodes.group_nodes(material)
     assert node.node_tree.library is None
     extension.api.set_parameters(material, e=30.0)
     extension.api.switch_representation(material, "aimed")

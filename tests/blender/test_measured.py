@@ -77,10 +77,10 @@ def test_what_a_file_holds(paint, found):
 def test_a_material_of_a_file(extension, empty, found, model):
     material = extension.api.new_measured_material(found, model)
     assert material.name == "paint"
-    (node,) = extension.nodes.group_nodes(material)
+    (node,) = extension.model_nodes.group_nodes(material)
     for name, value in found.fit(model).parameters.items():
         if not isinstance(value, str):
-            got = extension.nodes.get_value(node, name)
+            got = extension.model_nodes.get_value(node, name)
             assert got == pytest.approx(value, rel=1e-5, abs=1e-6), name
 
 
@@ -117,12 +117,15 @@ def test_the_sum_of_lobes_is_added_up(extension, empty, found):
     assert best.error <= found.fits[0].error
     material = extension.api.new_measured_material(found, "lobes")
     assert material.name == "paint"
-    nodes = {extension.nodes.identity(n).model: n for n in extension.nodes.group_nodes(material)}
+    nodes = {
+        extension.model_nodes.identity(n).model: n
+        for n in extension.model_nodes.group_nodes(material)
+    }
     assert nodes.keys() == {lobe.model for lobe in best.lobes}
     for lobe in best.lobes:
         for name, value in lobe.parameters.items():
             if not isinstance(value, str):
-                got = extension.nodes.get_value(nodes[lobe.model], name)
+                got = extension.model_nodes.get_value(nodes[lobe.model], name)
                 assert got == pytest.approx(value, rel=1e-5, abs=1e-6), name
     tree = material.node_tree
     added = [n for n in tree.nodes if n.type == "ADD_SHADER"]
@@ -230,8 +233,8 @@ def test_the_operator_makes_the_closest(extension, empty, paint):
     ball = helpers.add_sphere(empty, None)
     bpy.context.view_layer.objects.active = ball
     assert bpy.ops.brdfc.new_measured_material(filepath=str(paint)) == {"FINISHED"}
-    (node,) = extension.nodes.group_nodes(ball.active_material)
-    assert extension.nodes.identity(node).model == "ward"
+    (node,) = extension.model_nodes.group_nodes(ball.active_material)
+    assert extension.model_nodes.identity(node).model == "ward"
     with pytest.raises(RuntimeError, match="There is no file"):
         bpy.ops.brdfc.new_measured_material(filepath=str(paint) + "x")
     handler = bpy.types.FileHandler.bl_rna_get_subclass_py("BRDFC_FH_measured")

@@ -102,13 +102,13 @@ def test_a_folder_becomes_a_catalogue(extension, empty, folder, tmp_path):
     materials = load(blend)
     assert materials.keys() == set(made.materials.values())
     for name, material in materials.items():
-        data, (node,) = material.asset_data, extension.nodes.group_nodes(material)
+        data, (node,) = material.asset_data, extension.model_nodes.group_nodes(material)
         below = "/paper" if name in ("white", "paper/red.csv") else ""
         assert data.catalog_id == known[f"brdfc/Measured{below}"]
         assert re.search(r"CSV, .* of view; nothing was measured beyond 85 deg", data.description)
         assert "; phi_o lies within half a circle" in data.description
         assert {t.name for t in data.tags} == {"measured", "CSV"}
-        assert extension.nodes.identity(node).model == "lambert"
+        assert extension.model_nodes.identity(node).model == "lambert"
     red, white = color(materials["red.csv"]), color(materials["white"])
     assert red[0] > 2 * red[1] and white[2] > 2 * red[2] and np.ptp(white) < 0.1
     assert not [item for item in bpy.data.objects if item.library], "no scene of the pictures"
@@ -145,8 +145,8 @@ def test_the_operator_and_the_closest_model(extension, empty, tmp_path):
     (tmp_path / "broken.alta").write_text("#DIM 4 3\n")
     assert bpy.ops.brdfc.new_measured_library(directory=str(tmp_path)) == {"FINISHED"}
     (material,) = load(tmp_path / "measured.blend").values()
-    (node,) = extension.nodes.group_nodes(material)
-    assert material.name == "grey" and extension.nodes.identity(node).model == "lambert"
+    (node,) = extension.model_nodes.group_nodes(material)
+    assert material.name == "grey" and extension.model_nodes.identity(node).model == "lambert"
     layout = helpers.Layout()
     extension.ui.draw_material_menu(SimpleNamespace(layout=layout), bpy.context)
     assert any("brdfc.new_measured_library" in line for line in layout.log)

@@ -362,8 +362,8 @@ def test_links_and_ranges(extension, empty, tool):
     add_camera(empty)
     add_world(empty)
     plain = render(empty)
-    (node,) = extension.nodes.group_nodes(material)
-    tree, found = material.node_tree, extension.nodes.sockets(node)
+    (node,) = extension.model_nodes.group_nodes(material)
+    tree, found = material.node_tree, extension.model_nodes.sockets(node)
     for name, value in (("ax", 0.5), ("ay", 0.3)):
         number = tree.nodes.new("ShaderNodeValue")
         number.outputs[0].default_value = value
@@ -416,7 +416,7 @@ def test_a_bent_normal_takes_the_base_away(extension):
     def bent(scene, form):
         add_camera(scene, (0, -4, 0), (math.pi / 2, 0, 0), orthographic=2.2)
         material = extension.api.new_material("coupled", form)
-        (node,) = extension.nodes.group_nodes(material)
+        (node,) = extension.model_nodes.group_nodes(material)
         vector = material.node_tree.nodes.new("ShaderNodeCombineXYZ")
         for socket, value in zip(vector.inputs, (0.5, -0.7, 0.5), strict=True):
             socket.default_value = value
@@ -440,7 +440,7 @@ def test_a_wide_lamp_and_a_bent_normal(extension):
         (ball,) = (item for item in scene.objects if item.type == "MESH")
         material = ball.active_material
         material.cycles.use_bump_map_correction = False
-        (node,) = extension.nodes.group_nodes(material)
+        (node,) = extension.model_nodes.group_nodes(material)
         tree = material.node_tree
         geometry = tree.nodes.new("ShaderNodeNewGeometry")
         leaning = tree.nodes.new("ShaderNodeVectorMath")
@@ -469,7 +469,10 @@ def test_a_choice_without_nodes_is_a_sentence(extension, empty):
     material = extension.api.new_material("ashikhmin_shirley", "aimed", diffuse="tabulated")
     with pytest.raises(ValueError, match="only for"):
         extension.api.switch_representation(material, "nodes")
-    assert extension.nodes.identity(extension.nodes.group_nodes(material)[0]).form == "aimed"
+    assert (
+        extension.model_nodes.identity(extension.model_nodes.group_nodes(material)[0]).form
+        == "aimed"
+    )
 
 
 def test_auto_takes_other_forms(extension, empty):
@@ -531,8 +534,8 @@ def test_choices_of_automatic_materials(extension, empty):
         if not choices or "nodes" not in model["representations"]:
             continue
         material = extension.api.new_material(name)
-        (node,) = extension.nodes.group_nodes(material)
-        for group in (node.node_tree, extension.nodes.content_group(node.node_tree)):
+        (node,) = extension.model_nodes.group_nodes(material)
+        for group in (node.node_tree, extension.model_nodes.content_group(node.node_tree)):
             assert all(link.is_valid for link in group.links), name
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     settings(extension, bpy.context.scene, 64, osl=False, size=16)
@@ -562,7 +565,7 @@ def test_sockets_do_not_depend_on_how_a_group_began(extension, model):
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
         bpy.context.scene.render.engine = "CYCLES"
         bpy.context.scene.cycles.shading_system = osl
-        (node,) = extension.nodes.group_nodes(extension.api.new_material(model))
+        (node,) = extension.model_nodes.group_nodes(extension.api.new_material(model))
         return [(s.name, s.identifier, s.type) for s in node.inputs]
 
     with_osl, without = sockets(True), sockets(False)

@@ -507,7 +507,7 @@ def test_albedo_output_panel_and_model_agree(extension, empty, tool, model, valu
         scene, material = start(extension, model, form, values, max_bounces=0)
         tree = material.node_tree
         extension.api.add_albedo(material)
-        node = extension.nodes.group_nodes(material)[0]
+        node = extension.model_nodes.group_nodes(material)[0]
         output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
         emission = tree.nodes.new("ShaderNodeEmission")
         tree.links.new(node.outputs["Albedo"], emission.inputs["Color"])

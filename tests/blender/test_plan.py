@@ -149,7 +149,7 @@ def test_tables_of_the_views_that_occur_show_the_same(
         assert extension.api.albedo("phong", 0.53)[0] > 0
         with pytest.raises(ValueError, match="built for one scene, where phong is seen at 0.43"):
             extension.api.albedo("phong", 1)
-        (node,) = extension.nodes.group_nodes(extension.api.new_material("phong", form))
+        (node,) = extension.model_nodes.group_nodes(extension.api.new_material("phong", form))
         assert extension.ui.energy_text(node) == "not at a view angle of this scene"
     finally:
         extension.pack.use()
@@ -200,9 +200,9 @@ def test_what_a_blend_file_uses_is_all_that_a_pack_holds(extension, empty, tool,
     api, bpy = extension.api, extension.api.bpy
     api.new_material("radziszewski_alda", "sampled", n=7.0, tint=(0.9, 0.5, 0.25))
     varied = api.new_material("ward", ax=0.25, normalisation="duer")
-    node = extension.nodes.group_nodes(varied)[0]
+    node = extension.model_nodes.group_nodes(varied)[0]
     value = varied.node_tree.nodes.new("ShaderNodeValue")
-    varied.node_tree.links.new(value.outputs[0], extension.nodes.sockets(node)["ay"])
+    varied.node_tree.links.new(value.outputs[0], extension.model_nodes.sockets(node)["ay"])
     bpy.data.materials.new("of another kind")
     file = tmp_path / "materials.json"
     assert bpy.ops.brdfc.write_materials(filepath=str(file)) == {"FINISHED"}

@@ -18,8 +18,8 @@ def api(extension, empty, kept_program, monkeypatch):
 
 
 def socket(extension, material, name="r0"):
-    (node,) = extension.nodes.group_nodes(material)
-    return extension.nodes.sockets(node)[name]
+    (node,) = extension.model_nodes.group_nodes(material)
+    return extension.model_nodes.sockets(node)[name]
 
 
 def key(socket, values=((1, 0.05), (10, 0.6))):
@@ -261,14 +261,14 @@ def test_models_of_one_name_in_two_groups_are_two(extension, api):
     for r0 in (0.1, 0.3):
         group = bpy.data.node_groups.new("Inner", "ShaderNodeTree")
         inner.append(extension.nodes.add_group_node(group, "coupled"))
-        extension.nodes.set_value(inner[-1], "r0", r0)
+        extension.model_nodes.set_value(inner[-1], "r0", r0)
         tree.nodes.new("ShaderNodeGroup").node_tree = group
     assert len({node.name for node in inner}) == 1
     listed = api.used_materials()
     assert [entry["parameters"]["r0"] for entry in listed.values()] == [0.1, 0.3]
     assert len(listed) == 2
     assert api.bake(api.plan()) == 2
-    found = [extension.nodes.get_value(node, "r0") for node in inner]
+    found = [extension.model_nodes.get_value(node, "r0") for node in inner]
     assert found == pytest.approx([0.1, 0.3])
 
 

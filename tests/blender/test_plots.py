@@ -40,7 +40,7 @@ def pixels_of(preview):
 
 def shown(panel, extension, model, **values):
     material = extension.api.new_material(model, **values)
-    (node,) = extension.nodes.group_nodes(material)
+    (node,) = extension.model_nodes.group_nodes(material)
     preview, near = panel.picture(node)
     return pixels_of(preview), near
 
@@ -92,7 +92,7 @@ def test_balls_of_a_matte_surface_are_lamberts_cosine(extension, panel, plots, e
     """For the model, for a twin, and for a Principled node without a specular interface."""
     rho = np.array([0.8, 0.4, 0.1])
     material = extension.api.new_material("lambert", form, rho=tuple(rho))
-    (node,) = extension.nodes.group_nodes(material)
+    (node,) = extension.model_nodes.group_nodes(material)
     picture = pixels_of(panel.picture(node)[0])[plots.BALLS]
     lamp = np.array([-0.45, 0.6, 0.66]) / np.linalg.norm([-0.45, 0.6, 0.66])
     for ball in range(balls):
@@ -149,10 +149,12 @@ def over_the_hemisphere(wo, count=120):
 
 
 def light_of(extension, plots, form_light, material):
-    (node,) = extension.nodes.group_nodes(material)
-    model = plots.brdfc.model(extension.nodes.identity(node).model)
+    (node,) = extension.model_nodes.group_nodes(material)
+    model = plots.brdfc.model(extension.model_nodes.identity(node).model)
     values = plots.values_in_range(model, extension.api.get_parameters(material))
-    form = functools.partial(form_light.lobes, node) if extension.nodes.is_fitted(node) else None
+    form = (
+        functools.partial(form_light.lobes, node) if extension.model_nodes.is_fitted(node) else None
+    )
     return plots.light(model, values, form)
 
 
@@ -237,7 +239,7 @@ def test_curves_are_lines_dots_and_dashes(extension, panel, plots, empty):
     """For the albedo, where the curves differ; and below each ball the line style of its curve."""
     material = extension.api.new_material("lossless", "twin")
     picture = legend_of(panel, extension, material)[2]
-    (node,) = extension.nodes.group_nodes(material)
+    (node,) = extension.model_nodes.group_nodes(material)
     keys = picture[plots.BALLS][plots.KEY // 2]
     third = plots.SIZE // 3
     lit = [keys[i * third : (i + 1) * third].max(axis=-1) > 0.5 for i in range(3)]
@@ -389,8 +391,8 @@ def form_light(extension):
 def of_form(form_light, plots, extension, material, wi, wo):
     """f cos of a material's form at its values, for several views wo and light directions wi of
     each."""
-    (node,) = extension.nodes.group_nodes(material)
-    model = plots.brdfc.model(extension.nodes.identity(node).model)
+    (node,) = extension.model_nodes.group_nodes(material)
+    model = plots.brdfc.model(extension.model_nodes.identity(node).model)
     values = plots.values_in_range(model, extension.api.get_parameters(material))
     lobes = form_light.lobes(node, plots._complete(model, values), np.array(wo))
     return [lobes.scattered(w[None], slice(i, i + 1))[0] for i, w in enumerate(wi)]
@@ -489,7 +491,7 @@ def test_a_file_that_is_opened_has_the_same_curves(form_light, plots, extension,
 def legend_of(panel, extension, material):
     layout = helpers.Layout()
     panel.draw_plots(layout, material)
-    (node,) = extension.nodes.group_nodes(material)
+    (node,) = extension.model_nodes.group_nodes(material)
     preview, legend = panel.picture(node)
     return layout.log, legend, pixels_of(preview)
 
@@ -560,7 +562,7 @@ def test_forms_that_equal_the_model_have_no_curve(panel, extension, empty):
 def test_a_form_that_can_not_be_read_is_said(panel, extension, empty):
     """A file may contain anything."""
     material = extension.api.new_material("phong", "fitted")
-    (node,) = extension.nodes.group_nodes(material)
+    (node,) = extension.model_nodes.group_nodes(material)
     script = next(n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeScript")
     said = "Render method Fitted: what it reflects can't be plotted"
     good = script.script.as_string()
@@ -570,7 +572,7 @@ def test_a_form_that_can_not_be_read_is_said(panel, extension, empty):
         log, legend, _ = legend_of(panel, extension, material)
         assert said in " ".join(log) and legend.form is None and legend.principled is not None
     twin = extension.api.new_material("phong", "twin")
-    (group,) = extension.nodes.group_nodes(twin)
+    (group,) = extension.model_nodes.group_nodes(twin)
     (end,) = (n for n in group.node_tree.nodes if n.bl_idname == "NodeGroupOutput")
     glass = group.node_tree.nodes.new("ShaderNodeBsdfGlass")
     group.node_tree.links.new(glass.outputs[0], end.inputs["BSDF"])
@@ -781,7 +783,7 @@ def test_a_moved_slider_draws_anew_and_nothing_else_does(
     draw = plots.draw
     monkeypatch.setattr(plots, "draw", lambda *a: calls.append(a) or draw(*a))
     material = extension.api.new_material("ward")
-    (node,) = extension.nodes.group_nodes(material)
+    (node,) = extension.model_nodes.group_nodes(material)
     before = len(bpy.data.images), len(bpy.data.textures)
     pictures = []
     for ax in (0.11, 0.21, 0.31):
@@ -804,7 +806,7 @@ def test_a_moved_slider_draws_anew_and_nothing_else_does(
 
 def test_the_panel_names_what_it_cannot_know(extension, panel, plots, empty, monkeypatch):
     material = extension.api.new_material("cook_torrance")
-    (node,) = extension.nodes.group_nodes(material)
+    (node,) = extension.model_nodes.group_nodes(material)
     layout = helpers.Layout()
     panel.draw_plots(layout, material)
     assert "picture 14.4" in layout.log
@@ -813,7 +815,7 @@ def test_the_panel_names_what_it_cannot_know(extension, panel, plots, empty, mon
     assert any("Its roughness 0.58, metallic 1.00, IOR 1.50" in line for line in layout.log)
     assert not any("default" in line for line in layout.log)
     value = node.id_data.nodes.new("ShaderNodeValue")
-    node.id_data.links.new(value.outputs[0], extension.nodes.sockets(node)["m"])
+    node.id_data.links.new(value.outputs[0], extension.model_nodes.sockets(node)["m"])
     layout = helpers.Layout()
     panel.draw_plots(layout, material)
     label = extension.pack.model("cook_torrance").parameters["m"]["label"]

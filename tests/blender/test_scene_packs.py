@@ -65,8 +65,10 @@ def test_a_scene_renders_from_its_own_extension(extension, empty, answers, tool,
     with installed(extension, path) as module:
         scene = SceneLoader(module("api").__package__).load_scene(tmp_path / "scene" / "scene.json")
         picture = render(scene)[..., :3]
-        made = {m.name: module("groups.nodes").group_nodes(m) for m in bpy.data.materials}
-        models = {module("groups.nodes").identity(n).model for ours in made.values() for n in ours}
+        made = {m.name: module("groups.model_nodes").group_nodes(m) for m in bpy.data.materials}
+        models = {
+            module("groups.model_nodes").identity(n).model for ours in made.values() for n in ours
+        }
     assert models == {m["model"] for m in content["materials"].values()}
     assert np.isfinite(picture).all() and picture.max() > 1e-3
 
@@ -98,10 +100,10 @@ def test_a_scene_renders_from_its_own_extension_without_osl(
         extension.pack.use(built[pack])
         try:
             scene = load(tmp_path / "scene" / "scene.json", osl=osl)
-            ours = [n for m in bpy.data.materials for n in extension.nodes.group_nodes(m)]
-            assert {extension.nodes.identity(node).form for node in ours} == wanted
+            ours = [n for m in bpy.data.materials for n in extension.model_nodes.group_nodes(m)]
+            assert {extension.model_nodes.identity(node).form for node in ours} == wanted
             pictures[pack, osl] = render(scene)[..., :3]
-            assert {extension.nodes.identity(node).form for node in ours} == wanted
+            assert {extension.model_nodes.identity(node).form for node in ours} == wanted
         finally:
             extension.pack.use()
     with_osl = pictures["both", True]
@@ -201,11 +203,11 @@ def test_every_model_with_constants_loads_with_its_twin(extension, empty, use_pa
             only = pack.model(name).forms[form].only
             given = {k: v for k, v in (values | only).items() if k not in fixed}
             material = api.new_material(name, form, **given)
-            (node,) = nodes.group_nodes(material)
+            (node,) = extension.model_nodes.group_nodes(material)
             assert nodes.script_problem(node.node_tree) is None
-            sockets = set(nodes.sockets(node)) - {"Normal", "Tangent"}
+            sockets = set(extension.model_nodes.sockets(node)) - {"Normal", "Tangent"}
             assert sockets.isdisjoint(fixed) and sockets <= set(given)
-            complete = nodes.all_values(node)
+            complete = extension.model_nodes.all_values(node)
             for key, value in (values | only | fixed).items():
                 equal = extension.parameter_values.equal_in_float32(complete[key], value)
                 assert equal, (name, form, key)

@@ -356,7 +356,9 @@ def test_representation_can_be_overridden(extension, empty, scene_file):
         return next(o for o in scene.objects if o.type == "MESH").active_material
 
     forms = {
-        form: extension.nodes.identity(extension.nodes.group_nodes(material(form))[0])[1]
+        form: extension.model_nodes.identity(extension.model_nodes.group_nodes(material(form))[0])[
+            1
+        ]
         for form in (None, "auto", "exact", "sampled")
     }
     assert forms == {None: "exact", "auto": "exact", "exact": "exact", "sampled": "sampled"}
@@ -374,7 +376,7 @@ def test_a_matte_floor_needs_no_shader(extension, empty, scene_file, monkeypatch
     monkeypatch.setattr(extension.pack, "model_names", lambda: ["minnaert"])
     scene = extension.scene_loader.load_scene(path)
     (material,) = {s.material for o in scene.objects for s in o.material_slots}
-    assert not extension.nodes.group_nodes(material)
+    assert not extension.model_nodes.group_nodes(material)
     assert render(scene) == pytest.approx(before, rel=1e-4)
     for wrong, message in (
         ({"rho": 2}, r"materials\.white\.parameters\.rho: expected numbers from 0 to 1, got 2"),

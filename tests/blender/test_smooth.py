@@ -81,7 +81,7 @@ def test_a_converted_mirror_is_as_it_was_and_so_are_its_settings(extension, shap
 
     def and_back():
         material = converted(as_earlier_versions=True)
-        (node,) = extension.nodes.group_nodes(material)
+        (node,) = extension.model_nodes.group_nodes(material)
         del node["brdfc_before_bump_map_correction"]
         assert api.convert_back(material) == 1
         return material

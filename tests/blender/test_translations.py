@@ -133,7 +133,7 @@ def test_sentences_within_sentences(i18n, speak):
 
 def test_what_is_behind_a_sentence(extension, i18n, phong, empty):
     """Scripts get one text with everything, users a sentence and a button."""
-    group = extension.nodes.group_nodes(phong)[0].node_tree
+    group = extension.model_nodes.group_nodes(phong)[0].node_tree
     script = next(n for n in group.nodes if n.bl_idname == "ShaderNodeScript")
     group.nodes.remove(script)
     (finding,) = [f for f in extension.api.warnings(phong, empty) if f.code == "script_failed"]
@@ -145,7 +145,7 @@ def test_what_is_behind_a_sentence(extension, i18n, phong, empty):
     assert "script node" not in "\n".join(layout.log)
     assert bpy.ops.brdfc.more(text="behind") == {"FINISHED"}
     # The suggested action fixes it.
-    node = extension.nodes.group_nodes(phong)[0]
+    node = extension.model_nodes.group_nodes(phong)[0]
     assert bpy.ops.brdfc.switch(node=node.name, representation="fitted") == {"FINISHED"}
     assert "script_failed" not in {f.code for f in extension.api.warnings(phong, empty)}
 

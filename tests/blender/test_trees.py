@@ -477,26 +477,26 @@ def test_an_image_of_two_has_a_mean(shown, values):
 def test_a_muted_link_leaves_a_parameter_its_value(extension, empty):
     """To scripts, the list of used models, and a lean shader."""
     material = extension.api.new_material("coupled", r0=0.3)
-    (node,) = extension.nodes.group_nodes(material)
-    socket = extension.nodes.sockets(node)["r0"]
+    (node,) = extension.model_nodes.group_nodes(material)
+    socket = extension.model_nodes.sockets(node)["r0"]
     link = material.node_tree.links.new(new_value(material.node_tree, 0.9).outputs[0], socket)
     assert "r0" not in extension.api.get_parameters(material)
     link.is_muted = True
     assert extension.api.get_parameters(material)["r0"] == pytest.approx(0.3)
     (used,) = extension.api.used_materials().values()
     assert used["parameters"]["r0"] == pytest.approx(0.3)
-    assert extension.nodes.constants(node)["r0"] == pytest.approx(0.3)
+    assert extension.model_nodes.constants(node)["r0"] == pytest.approx(0.3)
     extension.api.set_parameters(material, r0=0.4)
     extension.api.switch_representation(material, "sampled")
-    (link,) = extension.nodes.sockets(node)["r0"].links
+    (link,) = extension.model_nodes.sockets(node)["r0"].links
     assert link.is_muted, "the link stays, and stays muted"
     assert extension.api.get_parameters(material)["r0"] == pytest.approx(0.4)
 
 
 def test_a_muted_model_is_not_warned_of(extension, empty):
     material = extension.api.new_material("coupled")
-    (node,) = extension.nodes.group_nodes(material)
-    extension.nodes.sockets(node)["r0"].default_value = 7.0
+    (node,) = extension.model_nodes.group_nodes(material)
+    extension.model_nodes.sockets(node)["r0"].default_value = 7.0
     assert "out_of_range" in {f.code for f in extension.api.warnings(material, empty)}
     node.mute = True
     assert extension.api.warnings(material, empty) == []

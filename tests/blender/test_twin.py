@@ -118,13 +118,13 @@ def balls(extension):
 
 def test_a_twin_stands_in_where_shaders_do_not_run(extension, balls):
     """Pixel by pixel, up to rounding: with OSL the shader alone, without it the twin."""
-    api, nodes = extension.api, extension.nodes
+    api = extension.api
     made = [api.new_material(m, form) for m, (form, _) in STAND_INS.items()]
     for material, (_, values) in zip(made, STAND_INS.values(), strict=True):
         api.set_parameters(material, **values)
     shader, stood_in = balls(made, osl=True), balls(made, osl=False)
     for material in made:
-        (node,) = nodes.group_nodes(material)
+        (node,) = extension.model_nodes.group_nodes(material)
         mix = next(n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeMixShader")
         alone = mix.inputs[2].links[0].from_socket
         node.node_tree.links.new(alone, mix.outputs[0].links[0].to_socket)
@@ -137,10 +137,10 @@ def test_a_twin_stands_in_where_shaders_do_not_run(extension, balls):
 def test_what_is_linked_reaches_the_twin_too(extension, balls):
     def bumpy(form):
         material = extension.api.new_material("phong", form)
-        tree, (node,) = material.node_tree, extension.nodes.group_nodes(material)
+        tree, (node,) = material.node_tree, extension.model_nodes.group_nodes(material)
         noise, bump = (tree.nodes.new(f"ShaderNode{n}") for n in ("TexNoise", "Bump"))
         tree.links.new(noise.outputs[0], bump.inputs["Height"])
-        sockets = extension.nodes.sockets(node)
+        sockets = extension.model_nodes.sockets(node)
         tree.links.new(bump.outputs["Normal"], sockets["Normal"])
         tree.links.new(noise.outputs["Color"], sockets["ks"])
         return material
@@ -153,7 +153,7 @@ def test_what_is_linked_reaches_the_twin_too(extension, balls):
 def test_the_albedo_output_is_the_twins_too(extension, balls):
     def shining(form):
         material = extension.api.new_material("coupled", form)
-        tree, (node,) = material.node_tree, extension.nodes.group_nodes(material)
+        tree, (node,) = material.node_tree, extension.model_nodes.group_nodes(material)
         emission = tree.nodes.new("ShaderNodeEmission")
         tree.links.new(node.outputs["Albedo"], emission.inputs["Color"])
         output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
@@ -168,7 +168,7 @@ def test_the_albedo_output_is_the_twins_too(extension, balls):
 
 def test_a_group_that_lost_what_tells_where_shaders_run_is_made_anew(extension, empty):
     material = extension.api.new_material("phong")
-    (node,) = extension.nodes.group_nodes(material)
+    (node,) = extension.model_nodes.group_nodes(material)
     node.node_tree.nodes.remove(node.node_tree.nodes["Runs"])
     found = {f.code: f.message for f in extension.api.warnings(material, empty)}
     assert "has lost its node Runs" in found["script_failed"]
@@ -209,8 +209,8 @@ def test_animation_stays_with_its_socket_when_the_form_changes(extension, empty)
     """The twin of lafortune has fewer sockets, so they have other indices."""
     material = extension.api.new_material("lafortune")
     add_sphere(empty, material)  # Blender evaluates only what is used
-    (node,) = extension.nodes.group_nodes(material)
-    sockets = extension.nodes.sockets
+    (node,) = extension.model_nodes.group_nodes(material)
+    sockets = extension.model_nodes.sockets
     for frame, value in ((1, 10.0), (11, 60.0)):
         sockets(node)["e"].default_value = value
         sockets(node)["e"].keyframe_insert("default_value", frame=frame)

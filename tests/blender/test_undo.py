@@ -79,7 +79,7 @@ def state():
 
 
 def node_name(extension):
-    (node,) = extension.nodes.group_nodes(bpy.context.object.active_material)
+    (node,) = extension.model_nodes.group_nodes(bpy.context.object.active_material)
     return node.name
 
 
@@ -160,8 +160,8 @@ def test_kernel(extension, start):
 
 def test_update(extension, start):
     start("ward", ax=0.25)
-    (node,) = extension.nodes.group_nodes(bpy.context.object.active_material)
-    node.node_tree[extension.nodes.TAG]["digest"] = "of another version"
+    (node,) = extension.model_nodes.group_nodes(bpy.context.object.active_material)
+    node.node_tree[extension.model_nodes.TAG]["digest"] = "of another version"
     node.node_tree.name = "Old"
     bpy.ops.ed.undo_push(message="Age")
     is_one_step(bpy.ops.brdfc.update)
@@ -191,8 +191,8 @@ def test_bake(extension, start, with_program):
 
 def test_details_say_what_the_panel_leaves_out(extension, start):
     start("oren_nayar", representation="fitted")
-    (node,) = extension.nodes.group_nodes(bpy.context.object.active_material)
-    form, _ = extension.nodes.manifest_entry(node)
+    (node,) = extension.model_nodes.group_nodes(bpy.context.object.active_material)
+    form, _ = extension.model_nodes.manifest_entry(node)
     assert extension.ui.error_text(form).endswith(" %")
     lines = extension.ui.details(node, form)
     assert any(line.startswith("Part of the reflected light") for line in lines)
