@@ -16,9 +16,8 @@
 // squared albedo, for r = 1 seen from the horizon, and below 0.01 from above.
 //
 // Under the model is Lambert's law. The largest k is that of a light opposite to the viewer at the horizon, K = 1/2 - r
-// (1 - sin theta_o), so f >= rho / pi (1 - K) (1 - K s_o). Only close to the horizon is f as small as that. With d more
-// in place of the first factor, the excess is at most d^3 / (75 K^2) of the light, since (1 - c)^5 >= 1 - 5 c: less
-// than 1.1e-4 for d = K^(2/3) / 5.
+// (1 - sin theta_o), so f >= rho / pi (1 - K) (1 - K s_o). Only close to the horizon is f as small as that. With
+// K^(2/3) / 8 more in place of the first factor, what is too bright is at most 5e-5 of the light.
 #include "closures/closure.h"
 #include "model/sampling.h"
 #include "model/under.h"
@@ -67,7 +66,7 @@ template <class T> struct DisneyDiffuse {
   ClosureSum<T> under(const Vec3<T>& wo) const {
     const T zo = clamp01(wo.z),
             most = named("most", maximum(T(0.5) - r * sqr(zo) / (T(1) + sqrt(sin2_theta(wo))), T(0)));
-    const T more = minimum(sqr(cbrt(most)) / T(5), most);
+    const T more = minimum(sqr(cbrt(most)) / T(8), most);
     return {Closure<T>(ClosureKind::Diffuse, rho * ((T(1) - most + more) * (T(1) - most * schlick_weight(zo))))};
   }
 };
