@@ -18,7 +18,6 @@
 // Under the model is Lambert's law. The largest k is that of a light opposite to the viewer at the horizon, K = 1/2 - r
 // (1 - sin theta_o), so f >= rho / pi (1 - K) (1 - K s_o). Only close to the horizon is f as small as that. With
 // K^(2/3) / 8 more in place of the first factor, what is too bright is at most 5e-5 of the light.
-#include "closures/closure.h"
 #include "model/sampling.h"
 #include "model/under.h"
 
