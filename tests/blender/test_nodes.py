@@ -55,6 +55,7 @@ CASES = [
     pytest.param("cook_torrance", {}, marks=SLOW),
     pytest.param("coupled", {}, marks=SLOW),
     pytest.param("lafortune", {}, marks=SLOW),
+    pytest.param("disney_diffuse", {"rho": (0.9, 0.5, 0.2), "r": 0.8}, marks=SLOW),
     pytest.param("eon", {"rho": (0.9, 0.5, 0.2), "r": 0.8}, marks=SLOW),
     pytest.param("oren_nayar", {}, marks=SLOW),
     pytest.param("phong", {"e": 100.0}, marks=SLOW),

@@ -1218,6 +1218,35 @@ def eon_pdf(p, wi, wo):
     return (1 - level) * c / mp.pi + level / (2 * mp.pi)
 
 
+# ---- Disney's diffuse term: Burley, 2012, section 5.3 ------------------------------------------
+
+
+def disney_diffuse_f(p, wi, wo):
+    ki, ko, h = as_half(wi, wo)
+    f90 = mp.mpf(1) / 2 + 2 * mp.mpf(p["r"]) * dot(ki, h) ** 2
+    pair = [1 + (f90 - 1) * (1 - k[2]) ** 5 for k in (ki, ko)]
+    return [rho * pair[0] * pair[1] / mp.pi for rho in p["rho"]]
+
+
+def disney_diffuse_pdf(p, wi, wo):
+    return vec(wi)[2] / mp.pi
+
+
+def disney_diffuse_albedo(p, cos_o):
+    """cos^2 of the angle to the half vector is (1 + wi.wo) / 2, so f is a quadratic polynomial in
+    the azimuth's cosine, whose square is 1/2 on average; what is left is one in the height."""
+    co, r = mp.mpf(cos_o), mp.mpf(p["r"])
+    so5 = (1 - co) ** 5
+
+    def of(x):
+        middle, swing = r * (1 + x * co) - mp.mpf(1) / 2, r**2 * (1 - x**2) * (1 - co**2)
+        si5 = (1 - x) ** 5
+        return 2 * x * (1 + (si5 + so5) * middle + si5 * so5 * (middle**2 + swing / 2))
+
+    total = mp.quad(of, [0, 1])
+    return [rho * total for rho in p["rho"]]
+
+
 # ---- Lafortune ---------------------------------------------------------------------------------
 
 
@@ -1671,6 +1700,14 @@ MODELS = {
             {"r": 0, "rho": (0.9, 0.2, 1e-6)},
         ],
         cosines=[1, 0.5, 0.1],
+    ),
+    "disney_diffuse": dict(
+        f=disney_diffuse_f,
+        pdf=disney_diffuse_pdf,
+        albedo=disney_diffuse_albedo,
+        defaults={"rho": (0.8, 0.8, 0.8), "r": 0.5},
+        cases=[{}, {"r": 1, "rho": (1, 0.5, 0.1)}, {"r": 0, "rho": (0.9, 0.2, 1e-6)}],
+        cosines=[1, 0.5, 0.1, 0.01],
     ),
     "lafortune": dict(
         f=lafortune_f,
