@@ -26,7 +26,7 @@ PREFIX, PICTURE = "ball-", "picture-"
 LIBRARY = ROOT / "blender_addon" / "library" / "materials.json"
 #: The scene whose floor, lamps and room the pictures have; centres of their balls, in units of the
 #: radius.
-STUDIO, PICTURE_SPP = "as-fig8", 24
+STUDIO, PICTURE_SPP = "as-fig8", 16
 PLACES = ((-4.1, 0.4), (-2.3, -1.6), (0.0, -2.6), (2.3, -1.6), (4.1, 0.4))
 #: Pixels and samples of the picture; radius of a ball, and distance between two.
 SIZE, SPP, RADIUS, STEP = (231, 84), 48, 0.5, 1.12
