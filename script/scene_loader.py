@@ -254,8 +254,8 @@ class SceneLoader:
                 material = self.api.new_material(model, representation, **values)
             except ValueError as error:
                 raise ValueError(f"{view.file}: {view.path}: {error}") from error
-            node = self.nodes.group_nodes(material)[0]
-            targets = self.nodes.sockets(node)
+            node = self.model_nodes.group_nodes(material)[0]
+            targets = self.model_nodes.sockets(node)
             unknown = set(textures) - set(targets)
             if unknown:
                 raise view.error(f"no texture for {', '.join(sorted(unknown))}")

@@ -304,7 +304,7 @@ def test_sockets_equal_the_manifest(extension, made_forms, subtests):
                     expected = np.float32((*parameter["default"], 1))
                     assert np.array_equal(np.float32(socket.default_value), expected)
                 elif socket.type == "MENU":
-                    label = extension.nodes.choice_label
+                    label = extension.parameter_values.choice_label
                     assert socket.default_value == label(parameter["default"])
                     for choice in parameter["choices"]:
                         socket.default_value = label(choice)

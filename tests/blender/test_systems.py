@@ -268,7 +268,7 @@ try:
 except PermissionError:
     probe = True
 from bl_ext.user_default.brdfc_shaders import api
-from bl_ext.user_default.brdfc_shaders.groups import nodes
+from bl_ext.user_default.brdfc_shaders.groups import model_nodes, nodes
 from bl_ext.user_default.brdfc_shaders.packs import pack
 from bl_ext.user_default.brdfc_shaders.plotting import plots
 
@@ -287,10 +287,10 @@ baked = api.bake(plan)
 blend = out / "Bällchen.blend"
 bpy.ops.wm.save_as_mainfile(filepath=str(blend))
 bpy.ops.wm.open_mainfile(filepath=str(blend))
-(node,) = extension.model_nodes.group_nodes(bpy.data.materials["Ward"])
+(node,) = model_nodes.group_nodes(bpy.data.materials["Ward"])
 print("RESULT", json.dumps({
     "root": str(pack.root), "probe": probe, "count": count, "baked": baked,
-    "problem": nodes.script_problem(node.node_tree), "lean": extension.model_nodes.is_baked(node),
+    "problem": nodes.script_problem(node.node_tree), "lean": model_nodes.is_baked(node),
     "refused": [r for r in refused if "__pycache__" not in r and not r.endswith("probe")],
     "written": json.loads((out / "liste d'été 材料.json").read_text(encoding="utf-8")),
 }))
