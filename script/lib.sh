@@ -153,7 +153,7 @@ slowest_sources() {
   note "The slowest sources of ${1#"$ROOT"/}, in seconds:"
   awk -F '\t' '$4 ~ /\.o$/ { seconds[$4] = ($2 - $1) / 1000 }
     END { for (object in seconds) printf "%8.1f  %s\n", seconds[object], object }' "$1/.ninja_log" |
-    sort -rn | sed -e 's,CMakeFiles/,,' -e 's,\.o$,,' -e 5q
+    sort -rn | sed -n -e 's,CMakeFiles/,,' -e 's,\.o$,,' -e 1,5p  # reads all, or else sort would fail now and then
 }
 
 build_preset() { # build_preset PRESET [TARGET...]
