@@ -110,6 +110,7 @@ def prepare_material(material):
 
     Raises ValueError for a linked material, as every function here does that changes a material.
     """
+    enabling.enable()
     editable.check(argument_checks.material(material))
     return bump_correction.prepare(material)
 
@@ -236,6 +237,7 @@ def new_sum(lobes, representation="auto", name="Sum"):
 
 def _the_node(material, node=None):
     """A model node of a material: its only one, or the one that `node` is or names."""
+    enabling.enable()
     argument_checks.material(material)
     if isinstance(node, str):
         return model_nodes.named(material, node)
@@ -273,7 +275,6 @@ def set_parameters(material, node=None, **parameters):
 
 
 def _set(node, what, parameters):
-    enabling.enable()
     editable.check(node.id_data)
     model, representation = model_nodes.identity(node).model, model_nodes.form_in_script(node)
     lean_node = model_nodes.is_baked(node)
@@ -587,12 +588,14 @@ def warnings(material, scene):
 
     Returns an empty list if the material has no group of this extension.
     """
+    enabling.enable()
     return checks.warnings(argument_checks.material(material), argument_checks.scene(scene))
 
 
 def scene_warnings(scene):
     """What keeps materials of the file from rendering in a scene, if they need Open Shading
     Language; and which other parts of the scene Open Shading Language spoils."""
+    enabling.enable()
     return checks.of_file(argument_checks.scene(scene))
 
 
@@ -601,6 +604,7 @@ def follow_settings(scene):
 
     The extension does so by itself when a user changes settings, and before each render. A script
     that changes settings and then asks for warnings() must call this function in between."""
+    enabling.enable()
     automatic.follow(argument_checks.scene(scene))
 
 

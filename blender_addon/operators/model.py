@@ -270,7 +270,7 @@ class BRDFC_OT_substance(ChangesActiveMaterial, Operator):
         material = context.object.active_material
         name = bpy.path.abspath(self.filepath) if self.substance == _FILE else self.substance
         try:
-            if self.substance == _FILE and not name.endswith(optical.ENDINGS):
+            if self.substance == _FILE and not name.lower().endswith(optical.ENDINGS):
                 expected = say("{file}: expected a file NAME.csv or NAME.txt", file=repr(name))
                 raise ValueError(expected)
             node = model_nodes.named(material, self.node) if self.node else None

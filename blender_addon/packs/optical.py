@@ -43,8 +43,8 @@ def find(name):
         raise ValueError(
             f"expected the name of a substance or a file NAME.csv or NAME.txt, got {name!r}"
         )
-    name = os.fspath(name)
-    if not name.endswith(ENDINGS):
+    name = os.path.expanduser(bpy.path.abspath(os.fspath(name)))
+    if not name.lower().endswith(ENDINGS):
         return optics.substance(name)
     try:
         return optics.read(name)

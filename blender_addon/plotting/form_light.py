@@ -5,6 +5,7 @@ or from a pack of the file's own."""
 
 import numpy as np
 
+from ..content.group_content import is_native
 from ..groups import model_nodes, nodes
 from . import shader_nodes, shader_text
 
@@ -15,7 +16,7 @@ def lobes(node, values, wo):
     `values`: of all parameters; `wo`: unit vectors (k, 3) to the viewer, above the surface. This
     function and the Lobes it returns raise shader_text.Unreadable."""
     group = node.node_tree
-    if not nodes.is_native(group):
+    if not is_native(group):
         return shader_text.lobes(nodes.source_text(group), values, wo)
     given = dict.fromkeys((s.identifier for s in node.inputs), np.zeros(3))
     for name, socket in model_nodes.sockets(node).items():

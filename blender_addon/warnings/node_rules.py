@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Predicates of warnings about a group node: its shader, its version and its values."""
 
+from ..common.i18n import form_name
 from ..groups import model_nodes, nodes
 from ..packs.parameter_values import unused_parameters, value_text
 from .rows import when
@@ -70,4 +71,6 @@ def out_of_fit(at):
     if axis := at.form.get("axis"):
         value = model_nodes.get_value(at.node, axis["name"])
         if value is not None and not _is_within(value, axis):
-            yield _outside(value, at.schema[axis["name"]]["label"], axis)
+            form = "fitted" if model_nodes.identity(at.node).form == "fitted" else "twin"
+            found = _outside(value, at.schema[axis["name"]]["label"], axis)
+            yield found | {"form": form_name(form)}

@@ -117,7 +117,7 @@ OF_NODE = (
     Row(
         "out_of_fit",
         WARNING,
-        "{parameter} is {value}; the render method Fitted knows values from {low} to {high} and "
+        "{parameter} is {value}; the render method {form} knows values from {low} to {high} and "
         "shows the nearer end of that",
         node_rules.out_of_fit,
     ),

@@ -2,6 +2,7 @@
 #include "model/optical.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -115,7 +116,10 @@ std::string with_commas(std::string line) {
   return line;
 }
 
-bool is_file(const std::string& name) { return name.ends_with(".csv") || name.ends_with(".txt"); }
+bool is_file(std::string name) {
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  return name.ends_with(".csv") || name.ends_with(".txt");
+}
 
 }  // namespace
 
@@ -183,7 +187,7 @@ Substance read_substance(const fs::path& path) {
       }
       if (block.empty() || block.size() + 1 != fields.size()) block.clear();
     }
-    if (block.empty()) input_error("{}: expected the header wl,n or wl,k, got '{}'", where, line);
+    if (block.empty()) input_error("{}: expected the header wl,n or wl,k or wl,n,k, got '{}'", where, line);
     if (fields[0] == "wl") continue;
     std::vector<double> row;
     for (const std::string& f : fields)

@@ -74,8 +74,7 @@ template <class T> struct Factors {
   }
 
   template <class Visitor> void parameters(const Visitor& v) {
-    v(rho, ColorSpec{"rho", "Matte", {0.1, 0.03, 0.02}, "Share of the light that is reflected in all directions"}.as(
-               Optical::Reflectance));
+    v(rho, ColorSpec{"rho", "Matte", {0.1, 0.03, 0.02}, "Share of the light that is reflected in all directions"});
     v(strength, NumberSpec{"strength", "Strength", 1, 0, 0x1p99, 0, 4, "Factor of the highlight"}.by_factors());
     v(ax, NumberSpec{"ax", "Roughness X", 0.2, 1e-4, 1, 0.02, 0.5, "Unit of the slope along the tangent"}.by_factors());
     v(ay,

@@ -285,11 +285,11 @@ def read(path: str | PathLike[str]) -> Substance:
             comments.append(line[1:].strip(" \t\r"))
             continue
         separator = "," if "," in line else "\t"
-        fields = [f.strip(" \t\r") for f in line.split(separator)]
+        fields = [f.strip(' \t\r"') for f in line.split(separator)]
         if fields[0] == "wl":
             block = _header(fields, found, where)
         if not block:
-            raise ValueError(f"{where}: expected the header wl,n or wl,k, got '{line}'")
+            raise ValueError(f"{where}: expected the header wl,n or wl,k or wl,n,k, got '{line}'")
         if fields[0] == "wl":
             continue
         row = [_number(f) for f in fields]

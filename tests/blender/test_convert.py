@@ -1390,7 +1390,8 @@ def test_the_dialog_says_what_the_new_nodes_cost(extension, convert, item, osl):
     assert f"about {low:.1f} times" in convert.cost(plans[:1], scene)
     layout = helpers.Layout()
     operator = import_module(f"{extension.package}.operators.convert").BRDFC_OT_convert
-    operator.draw(SimpleNamespace(layout=layout, _within=lambda: plans), bpy.context)
+    drawn = SimpleNamespace(layout=layout, limit=35.0, _within=lambda: plans)
+    operator.draw(drawn, bpy.context)
     assert said in " ".join(layout.log)
     scene.render.engine = "BLENDER_WORKBENCH"  # renders no models
     assert convert.cost(plans, scene) is None

@@ -1627,18 +1627,22 @@ def test_disable_leaves_nothing_behind(extension, empty):
     assert all(c.is_registered for c in classes)
 
 
-@pytest.mark.parametrize("ways", ["new_material", "set_parameters", "see_lamps"])
-def test_a_script_that_imports_a_disabled_extension_enables_it(extension, empty, ways, capfd):
+@pytest.mark.parametrize(
+    "way", ["new_material", "set_parameters", "see_lamps", "warnings", "prepare_material"]
+)
+def test_a_script_that_imports_a_disabled_extension_enables_it(extension, empty, way, capfd):
     # Without handlers, a lamp that moves would stay where it was in every material.
     material = extension.api.new_material("ward")
     bpy.ops.preferences.addon_disable(module=extension.package)
     try:
-        if ways == "new_material":
-            extension.api.new_material("phong")
-        elif ways == "set_parameters":
-            extension.api.set_parameters(material, ax=0.3)
-        else:
-            extension.api.see_lamps(empty)
+        given, values = {
+            "new_material": (("phong",), {}),
+            "set_parameters": ((material,), {"ax": 0.3}),
+            "see_lamps": ((empty,), {}),
+            "warnings": ((material, empty), {}),
+            "prepare_material": ((material,), {}),
+        }[way]
+        getattr(extension.api, way)(*given, **values)
         assert bpy.types.BRDFC_OT_add_node.is_registered
         assert "enabled for this session" in capfd.readouterr().out
         extension.api.new_material("phong")
@@ -1660,3 +1664,13 @@ def test_a_disabled_extension_says_why_it_cant_be_enabled(extension, empty, monk
         assert not bpy.data.materials
     finally:
         bpy.ops.preferences.addon_enable(module=extension.package)
+
+
+def test_every_form_has_its_cost(extension):
+    unknown = [
+        (model, name)
+        for model, entry in extension.api.models().items()
+        for name, form in entry["representations"].items()
+        if not form["cost"]
+    ]
+    assert not unknown, "run evidence/bench --forms"

@@ -279,6 +279,7 @@ ODD = {
     ),
     GOOD + "1.2,1.42,0.004\n1.4,1.4,0\n": ("1 wavelength of n stands twice", "1 wavelength of k"),
     GOOD.replace(",", "\t"): (),
+    GOOD.replace("wl,n,k", '"wl","n","k"'): (),
     "wl,n,k\n" + "\n".join(reversed(GOOD.split("\n")[1:-1])): (),
     GOOD + "2,1.4,-1.6e-9\n": ("1 value of k is below 0, the least -1.6e-09: taken for 0",),
     GOOD + "20,1.4,180\n": ("1 value of k outside of [0, 100] and of the visible: left out",),
@@ -295,7 +296,7 @@ ODD = {
 def test_what_files_of_others_have_is_assumed_and_said(tmp_path, optics, text):
     """Visible wavelengths are not affected by the variation; the tool and the package report the
     same."""
-    file = tmp_path / ("odd.txt" if "\t" in text else "odd.csv")
+    file = tmp_path / ("odd.TXT" if "\t" in text else "odd.csv")
     file.write_text(GOOD, encoding="utf-8")
     plain = optical(file)
     file.write_text(text, encoding="utf-8")
@@ -316,10 +317,10 @@ def test_what_files_of_others_have_is_assumed_and_said(tmp_path, optics, text):
 BAD = {
     "": ": expected a line wl,n and rows below it, found no n",
     "wl,k\n0.3,1\n0.8,1\n": ": expected a line wl,n and rows below it, found no n",
-    "0.3,1\n": " line 1: expected the header wl,n or wl,k, got '0.3,1'",
-    "nm,n\n380,1\n": " line 1: expected the header wl,n or wl,k, got 'nm,n'",
-    "wl,n,x\n": " line 1: expected the header wl,n or wl,k, got 'wl,n,x'",
-    "wl\n": " line 1: expected the header wl,n or wl,k, got 'wl'",
+    "0.3,1\n": " line 1: expected the header wl,n or wl,k or wl,n,k, got '0.3,1'",
+    "nm,n\n380,1\n": " line 1: expected the header wl,n or wl,k or wl,n,k, got 'nm,n'",
+    "wl,n,x\n": " line 1: expected the header wl,n or wl,k or wl,n,k, got 'wl,n,x'",
+    "wl\n": " line 1: expected the header wl,n or wl,k or wl,n,k, got 'wl'",
     "wl,n,n\n": " line 1: expected n once",
     "wl,n\n0.3,1.5\n\nwl,n\n": " line 4: expected n once",
     "wl,n\n\n0.3,one\n": " line 3: expected 2 numbers, a wavelength in µm and n, got '0.3,one'",
