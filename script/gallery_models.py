@@ -337,17 +337,17 @@ def draw(model, formulas, pages):
 
 
 def materials_of(model, count):
-    """Materials of a model, in the form of a scene file: those of the library, then its first one
-    with other values of the parameter that varies between pictures. Materials with another choice
-    than the default come last: Formula Nodes lack some."""
+    """Materials of a model, in the form of a scene file: those of the library, without those that
+    have another choice than the default, which Formula Nodes may lack; then the first one with
+    other values of the parameter that varies between pictures."""
     library = json.loads(LIBRARY.read_text(encoding="utf-8")).values()
     entries = [e for catalog in library for e in catalog if e["model"] == model["name"]]
     choices = {p["name"]: p["default"] for p in model["parameters"] if p["kind"] == "choice"}
-    entries.sort(key=lambda e: any(e["values"].get(k, v) != v for k, v in choices.items()))
+    plain = [e for e in entries if all(e["values"].get(k, v) == v for k, v in choices.items())]
     made = [
         {"model": model["name"], "parameters": dict(e["values"])}
         | ({"optical": e["substance"]} if "substance" in e else {})
-        for e in entries
+        for e in plain or entries
     ]
     axis, first = axis_of(model), made[0]
     for value in values_of(axis):

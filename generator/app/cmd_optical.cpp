@@ -81,8 +81,9 @@ void add_optical_command(Command app) {
       "at normal incidence, and n and k by channel; for transparent substances also n_d, the Abbe number, and the\n"
       "transmittance for a thickness.\n"
       "The working space is the role scene_linear of the configuration that OCIO names, otherwise Rec.709.");
-  cmd.add_option("name", o->name,
-                 "Substance, or a file NAME.csv or NAME.txt as exported by refractiveindex.info; all substances if omitted");
+  cmd.add_option(
+      "name", o->name,
+      "Substance, or a file NAME.csv or NAME.txt as exported by refractiveindex.info; all substances if omitted");
   add_number(cmd, "--thickness", o->thickness, {kThinnest, kThickest},
              "Distance in metres for which the absorption of a glass is exact; prints the error at others")
       .capture_default_str();

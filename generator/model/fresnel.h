@@ -30,8 +30,8 @@ template <class T> T fresnel_conductor(const T& cosTheta, const T& sin2, const T
 /// The shares of light that a smooth dielectric boundary reflects and transmits; their sum is 1.
 template <class T> struct Dielectric { T reflected, refracted; };
 
-/// The transmitted share where the cosine of the refracted direction is known: `g` is that times `eta`. A direction that
-/// is given by a half vector has g = eta |wi.h|, which is precise near the critical angle, where sin^2 is not.
+/// The transmitted share where the cosine of the refracted direction is known: `g` is that times `eta`. A direction
+/// that is given by a half vector has g = eta |wi.h|, which is precise near the critical angle, where sin^2 is not.
 template <class T> T refracted_share(const T& cosTheta, const T& g, const T& eta) {
   const T eta2 = eta * eta;
   const T ds = named("d_s", sqr(cosTheta + g)), dp = named("d_p", sqr(eta2 * cosTheta + g));

@@ -98,8 +98,8 @@ Substance read_substance(const std::filesystem::path&);
 
 /// The substances of data/optical, by name.
 const std::vector<Substance>& substances();
-/// One of these substances; or one read from a file if the name ends with .csv or .txt, where a relative path is relative to
-/// `folder`. Throws InputError that lists the names, or as read_substance() does.
+/// One of these substances; or one read from a file if the name ends with .csv or .txt, where a relative path is
+/// relative to `folder`. Throws InputError that lists the names, or as read_substance() does.
 Substance find_substance(const std::string& name, const std::filesystem::path& folder);
 
 /// Converts X, Y and Z to the working space.
