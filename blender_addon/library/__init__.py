@@ -117,7 +117,7 @@ def description(entry):
     model = pack.model(entry.model)
     text = f"{entry.description}. {model.label}: {model.paper}"
     if model.native_form and model.native_form.refusal(entry.values):
-        text += ". Without Open Shading Language an approximation is shown"
+        text += ". Needs Open Shading Language: without it, the model's default choices are shown"
     return text
 
 

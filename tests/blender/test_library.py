@@ -88,7 +88,7 @@ def test_what_needs_open_shading_language_says_so(extension, library, empty):
     for entry in library.entries():
         warned = extension.api.warnings(library.make(extension.api, entry), empty)
         needs = "osl_off" in {warning.code for warning in warned}
-        assert needs == ("Without Open Shading Language" in library.description(entry)), entry.name
+        assert needs == ("Needs Open Shading Language" in library.description(entry)), entry.name
         found |= {entry.name} if needs else set()
     # Rays through a surface, and a choice of a model that has refraction as another.
     assert found == {"Frosted Glass", "Sea Glass", "Traffic Sign White"}
