@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <map>
+#include <string_view>
 
 #include "fit/roles.h"
 #include "forms/aimed_steps.h"
@@ -83,11 +85,31 @@ AimedRecording record_aimed(const Model& model, const ParamValues& fixed, AimedB
 /// name_x, name_y and name_z.
 std::vector<std::string> components(const std::string& name) { return {name + "_x", name + "_y", name + "_z"}; }
 Value vector_of(const std::string& name) { return call("vector", {name + "_x", name + "_y", name + "_z"}); }
-/// An element of an array of lamps or lobes: at the lamp of the current iteration, the lobe being aimed, or an earlier
-/// lobe.
+/// A slot of the current lamp.
 Value of_lamp(const char* array) { return element(array, "lamp"); }
-Value of_new(const char* array) { return element(array, "lobes"); }
-Value of_earlier(const char* array) { return element(array, "earlier"); }
+
+/// The numbers of a lamp and its lobe that later iterations read, kept in the array kept_<name>. Wherever they are read
+/// or assigned they have variables of their own: an array's element costs OSL's compiler a check of the index and code
+/// of its own at each mention, which is half of the time that a shader takes to compile.
+struct Kept {
+  const char *type, *of, *name;
+};
+constexpr Kept kKept[] = {
+    {"vector", "lamp", "centre"},     {"vector", "lamp", "across"},  {"vector", "lamp", "along"},
+    {"vector", "lobe", "towards"},    {"vector", "lobe", "half"},    {"float", "lamp", "disk"},
+    {"float", "lamp", "solid_angle"}, {"float", "lobe", "exponent"}, {"float", "lobe", "radius"},
+    {"float", "lobe", "end"},         {"float", "lobe", "extent"},   {"color", "lobe", "value"},
+};
+std::string kept_array(std::string_view name) { return fmt::format("kept_{}", name); }
+/// Declares variables <of>_<name> with the numbers of the lobe at an index.
+Statements load(const std::string& of, const char* index, const std::vector<std::string_view>& names) {
+  Statements out;
+  for (const std::string_view name : names) {
+    const Kept& kept = *std::ranges::find(kKept, name, &Kept::name);
+    out.push_back(declare(kept.type, fmt::format("{}_{}", of, name), element(kept_array(name), index)));
+  }
+  return out;
+}
 /// Transforms a direction of the scene into the shader's frame.
 Value in_frame(Value direction) { return call("brdfc_local", {std::move(direction), "frame_t", "frame_b", "frame_n"}); }
 
@@ -125,12 +147,15 @@ class AimedLamps {
                    Block{{run(steps_.alone)}}});
       return out;
     }
+    out.push_back(kinds_of_lamps());
     for (const char* what : {"Place", "Turn", "Scale", "Shape"}) out.push_back(slots_array(what));
     append(out, state());
     out.push_back(declare("vector", "horizon", in_frame("N")));
     out.push_back(Comment{"The lamps, and at last the direction that was drawn."});
     Statements turn = {
-        declare_all("float", {"wi_x", "wi_y", "wi_z", "lobe_height", "lamp_emphasis"}),
+        declare_all("vector", {"lamp_centre", "lamp_across", "lamp_along", "lobe_towards", "lobe_half"}),
+        declare_all("float", {"wi_x", "wi_y", "wi_z", "lamp_disk", "lamp_solid_angle", "lamp_emphasis", "lobe_height",
+                              "lobe_exponent", "lobe_radius", "lobe_end", "lobe_extent"}),
         If{is_lamp(), aim(), draw()},
         declare("color", "excess"),
         declare("float", "drawn_density"),
@@ -138,7 +163,6 @@ class AimedLamps {
     append(turn, value_.statements());
     turn.push_back(If{is_lamp(), send(), {run(steps_.rest)}});
     out.push_back(Loop{"lamp", "lamps", turn, true});
-    append(out, closures());
     return out;
   }
 
@@ -159,21 +183,37 @@ class AimedLamps {
     return Declare{"vector", {array}};
   }
 
+  /// What the lamps of the scene need. The sockets are constants, so OSL leaves out what they do not need when it
+  /// compiles the shader for a scene.
+  Statement kinds_of_lamps() const {
+    const auto any = [&](int first, const auto& is) {
+      std::vector<Value> slots;
+      for (int i = first; i <= lamps_; ++i) slots.push_back(is(Value(fmt::format("LampShape{}", i))));
+      return slots.empty() ? Value(0) : print::any_of(slots);
+    };
+    const auto test = [](const char* function) { return [=](const Value& shape) { return call(function, {shape}); }; };
+    return Declare{"int",
+                   {{"any_flat", {any(1, test("brdfc_is_flat"))}},
+                    {"any_spot", {any(1, test("brdfc_is_spot"))}},
+                    {"any_beam", {any(1, test("brdfc_has_beam"))}},
+                    {"several", {any(2, [](const Value& shape) { return operation(element(shape, 0), ">", 0.0); })}}}};
+  }
+
   /// Declares the variables for lamps and lobes, and counts the sockets up to the last one in use.
   Statements state() const {
-    const auto arrays = [&](const char* type, const std::vector<std::string>& names) {
-      Declare all{type, {}};
-      for (const std::string& name : names) all.variables.push_back({name, {}, lamps_});
-      return all;
-    };
-    Declare colours = arrays("color", {"lobe_value", "lobe_colour"});
+    std::map<std::string, Declare> arrays;
+    for (const Kept& kept : kKept) {
+      Declare& all = arrays.try_emplace(kept.type, Declare{kept.type, {}}).first->second;
+      all.variables.push_back({kept_array(kept.name), {}, lamps_});
+    }
+    Declare& colours = arrays.at("color");
     for (const char* name : {"covered", "covered_before"}) colours.variables.push_back({name, {0.0}});
     return {
-        arrays("vector", {"lamp_centre", "lamp_across", "lamp_along", "lobe_towards", "lobe_half"}),
-        arrays("float", {"lamp_disk", "lamp_solid_angle"}),
-        arrays("float", {"lobe_weight", "lobe_exponent", "lobe_radius", "lobe_end", "lobe_extent"}),
+        arrays.at("vector"),
+        arrays.at("float"),
         colours,
         Declare{"float", {{"ray_x"}, {"ray_y"}, {"ray_z"}, {"lamp_met", {0.0}}, {"density_under", {0.0}}}},
+        declare("closure color", "aimed", 0),
         Declare{"int", {{"lamps", {0}}, {"lobes", {0}}}},
         Loop{"lamp",
              lamps_,
@@ -187,16 +227,18 @@ class AimedLamps {
         declare_all("vector", {"centre_here", "across_here", "along_here", "beam_here"}),
         Declare{"float", {{"disk_here"}, {"beam_edge"}, {"beam_blend"}, {"lobe_room", {1.0}}}},
         If{operation(call("brdfc_lamp", {of_lamp("lamp_place"), of_lamp("lamp_turn"), of_lamp("lamp_scale"),
-                                         of_lamp("lamp_shape"), "centre_here", "across_here", "along_here", "disk_here",
-                                         "beam_here", "beam_edge", "beam_blend"}),
+                                         of_lamp("lamp_shape"), "any_flat", "any_spot", "centre_here", "across_here",
+                                         "along_here", "disk_here", "beam_here", "beam_edge", "beam_blend"}),
                      "==", 0),
            {Continue{}}},
-        assign(of_new("lamp_centre"), in_frame("centre_here")),
-        assign(of_new("lamp_across"), in_frame("across_here")),
-        assign(of_new("lamp_along"), in_frame("along_here")),
-        assign(of_new("lamp_disk"), "disk_here"),
-        Declare{"vector", {{"shining_centre", {of_new("lamp_centre")}}, {"shining_across", {of_new("lamp_across")}}}},
-        declare("vector", "shining_along", of_new("lamp_along")),
+        assign("lamp_centre", in_frame("centre_here")),
+        assign("lamp_across", in_frame("across_here")),
+        assign("lamp_along", in_frame("along_here")),
+        assign("lamp_disk", "disk_here"),
+        Declare{"vector",
+                {{"shining_centre", {"lamp_centre"}},
+                 {"shining_across", {"lamp_across"}},
+                 {"shining_along", {"lamp_along"}}}},
         declare("float", "shining_disk", "disk_here"),
     };
     Statements lit = {
@@ -206,12 +248,12 @@ class AimedLamps {
         run(steps_.beam),
     };
     for (const std::string what : {"centre", "across", "along", "disk"})
-      lit.push_back(assign(element("lamp_" + what, "lobes"), "lit_" + what));
+      lit.push_back(assign("lamp_" + what, "lit_" + what));
     // Bump Map Correction bends the normals of lobes downwards. From Blender 5.0 on, Cycles evaluates no lobe in
     // directions below the interpolated normal.
     append(out, {
-                    If{operation("beam_edge", ">", 0.0), lit},
-                    declare("vector", "to_centre", call("normalize", {of_new("lamp_centre")})),
+                    If{print::all_of({"any_beam", operation("beam_edge", ">", 0.0)}), lit},
+                    declare("vector", "to_centre", call("normalize", {"lamp_centre"})),
                     assign("to_centre", in_scene_of("to_centre")),
                     If{print::any_of({operation(call("dot", {"N", "to_centre"}), "<=", 0.0),
                                       call("brdfc_is_below", {"to_centre", kMirrorRise})}),
@@ -226,12 +268,12 @@ class AimedLamps {
                Comment{"Numbers of its own: what a lobe gives at another's lamp must not go with where that is met."},
                declare("vector", "v_all", call("brdfc_random", {Value(1) + "lamp", "path_length"})),
                Declare{"float", {{"v_1", {element("v_all", 0)}}, {"v_2", {element("v_all", 1)}}}},
-               earlier_lobes({run(steps_.room)}),
+               If{"several", {earlier_lobes({"towards", "radius"}, {run(steps_.room)})}},
                declare_all("float", {"to_lamp_x", "to_lamp_y", "to_lamp_z", "to_half_x", "to_half_y", "to_half_z"}),
                run(steps_.aim),
                none_left,
-               assign(of_new("lobe_towards"), vector_of("to_lamp")),
-               assign(of_new("lobe_half"), vector_of("to_half")),
+               assign("lobe_towards", vector_of("to_lamp")),
+               assign("lobe_half", vector_of("to_half")),
                declare("float", "lamp_low"),
                Block{{run(steps_.low)}},
                If{print::all_of({operation("lamp_low", "<", 0.0),
@@ -240,63 +282,79 @@ class AimedLamps {
                                            "!=", 0)}),
                   {run(steps_.cut), none_left}},
                Comment{"Drawn directions do not meet it, or are not to: see brdfc_lamp()."},
-               If{operation(element(of_lamp("lamp_shape"), 1), "<", 0.0), {assign(of_new("lamp_solid_angle"), 1e-20)}},
+               If{operation(element(of_lamp("lamp_shape"), 1), "<", 0.0), {assign("lamp_solid_angle", 1e-20)}},
            });
     return out;
   }
 
   /// Draws a direction, and sums up what the lamps mean for it.
   Statements draw() const {
+    Statements draw_under = {declare("int", "chosen", call("int", {"tossed"}))};
+    append(draw_under, load("chosen", "chosen", {"towards", "extent"}));
+    draw_under.push_back(run(steps_.under));
     Statements out = {
         declare("float", "tossed"),
         run(steps_.toss),
-        If{operation("tossed", "<", 0.0),
-           draw_.statements(),
-           {declare("int", "chosen", call("int", {"tossed"})), run(steps_.under)}},
+        If{operation("tossed", "<", 0.0), draw_.statements(), draw_under},
     };
     for (const char* axis : {"_x", "_y", "_z"})
       out.push_back(assign(std::string("ray") + axis, std::string("drawn") + axis));
     // A lamp and its seam always lie within the lamp's lobe.
-    out.push_back(earlier_lobes({If{under_lobe("drawn"), {run(steps_.meet)}}}));
+    out.push_back(under_earlier_lobes(
+        "drawn", {"half", "exponent", "extent", "value", "centre", "across", "along", "disk", "solid_angle"},
+        steps_.meet));
     for (const char* axis : {"_x", "_y", "_z"})
       out.push_back(assign(std::string("wi") + axis, std::string("drawn") + axis));
     return out;
   }
 
-  /// Assigns the value of the lobe that was aimed.
+  /// Assigns the value of the lobe that was aimed, keeps its numbers, and adds its closure.
   Statements send() const {
-    return {earlier_lobes({If{under_lobe("wi"), {run(steps_.less)}}}), run(steps_.send), print::Increment{"lobes"}};
+    Statements out = {If{"several", {under_earlier_lobes("wi", {"half", "exponent", "value"}, steps_.less)}},
+                      declare("float", "lobe_weight"), declare_all("color", {"lobe_value", "lobe_colour"}),
+                      run(steps_.send)};
+    for (const Kept& kept : kKept)
+      out.push_back(assign(element(kept_array(kept.name), "lobes"), fmt::format("{}_{}", kept.of, kept.name)));
+    append(out, {print::Increment{"lobes"}, closure()});
+    return out;
   }
 
-  /// A loop over all lobes so far, inside the loop over the lamps.
-  static Statement earlier_lobes(Statements body) { return Loop{"earlier", "lobes", std::move(body)}; }
-  static Value under_lobe(const std::string& direction) {
-    return operation(call("dot", {of_earlier("lobe_towards"), vector_of(direction)}), ">", of_earlier("lobe_end"));
+  /// A loop over all lobes so far, inside the loop over the lamps, that reads these numbers of each.
+  static Statement earlier_lobes(const std::vector<std::string_view>& names, const Statements& body) {
+    Statements all = load("earlier", "earlier", names);
+    append(all, body);
+    return Loop{"earlier", "lobes", std::move(all)};
+  }
+  /// A loop over the lobes so far that contain a direction.
+  static Statement under_earlier_lobes(const std::string& direction, const std::vector<std::string_view>& names,
+                                       const Recording& step) {
+    Statements inside = load("earlier", "earlier", names);
+    inside.push_back(run(step));
+    const Value is_under = operation(call("dot", {"earlier_towards", vector_of(direction)}), ">", "earlier_end");
+    return earlier_lobes({"towards", "end"}, {If{is_under, inside}});
   }
   /// Transforms a direction of the shader's frame into the scene.
   static Value in_scene_of(const char* v) { return in_scene(element(v, 0), element(v, 1), element(v, 2)); }
 
-  /// The closures of all lobes. Each is added at the left of the sum, which Cycles traverses without a stack. The
-  /// weight is a colour: see kPoolNode.
-  static Statements closures() {
+  /// The closure of the lobe. It is added at the left of the sum, which Cycles traverses without a stack. The weight is
+  /// a colour: see kPoolNode.
+  static Statement closure() {
     constexpr int kSize = int(kRampSize);
     Variable level{"lobe_level", {}, kSize};
     for (const double c : aimed_ramp()) level.values.push_back(c);
-    const Statements one = {
-        Declare{"float", {level}},
-        Declare{"color", {{"lobe_colours", {}, kSize}}},
-        Loop{"entry",
-             kSize,
-             {assign(element("lobe_colours", "entry"), element("lobe_level", "entry") * of_lamp("lobe_colour"))}},
-        declare("vector", "half_way", of_lamp("lobe_half")),
-        assign("half_way", in_scene_of("half_way")),
-        declare("color", "lobe_followed", of_lamp("lobe_weight")),
-        assign("aimed",
-               Value("lobe_followed") * call("phong_ramp", {"half_way", of_lamp("lobe_exponent"), "lobe_colours"}) +
-                   "aimed"),
-    };
-    return {declare("closure color", "aimed", 0),
-            Loop{"lamp", "lobes", {If{operation(of_lamp("lobe_weight"), ">", 0.0), one}}}};
+    return If{
+        operation("lobe_weight", ">", 0.0),
+        {
+            Declare{"float", {level}},
+            Declare{"color", {{"lobe_colours", {}, kSize}}},
+            Loop{"entry",
+                 kSize,
+                 {assign(element("lobe_colours", "entry"), element("lobe_level", "entry") * "lobe_colour")}},
+            declare("vector", "half_way", in_scene_of("lobe_half")),
+            declare("color", "lobe_followed", "lobe_weight"),
+            assign("aimed", Value("lobe_followed") * call("phong_ramp", {"half_way", "lobe_exponent", "lobe_colours"}) +
+                                "aimed"),
+        }};
   }
 
   const AimedSteps& steps_ = aimed_steps();

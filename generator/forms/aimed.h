@@ -331,14 +331,14 @@ template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const LampPatc
   };
   // Mean over the shining part by a four-point rule that is exact to degree 3 (A. Stroud: Approximate Calculation of
   // Multiple Integrals, 1971, C2: 3-1 and S2: 3-1). The same rule gives the mean cosine to the lobe's normal.
+  // Each of the points is the one before it, turned by 90 degrees. State of the loop: the point, and the two sums.
   const T node = select(round, T(std::sqrt(0.5)), T(std::sqrt(1.0 / 3))), other = select(round, T(0), node);
-  T mean(0), mean_rise(0);
-  for (const Vec3<T>& p : {shining.at(node, other), shining.at(-node, other * T(-1)), shining.at(other * T(-1), node),
-                           shining.at(other, -node)}) {
-    const T d = density(p);
-    mean = mean + d / T(4);
-    mean_rise = mean_rise + d / T(4) * (dot(lamp.lobe.half, p) / sqrt(dot(p, p)));
-  }
+  const std::array<T, 4> means = iterate(4, std::array<T, 4>{node, other, T(0), T(0)}, [&](const std::array<T, 4>& s) {
+    const Vec3<T> p = shining.at(s[0], s[1]);
+    const T d = density(p) / T(4);
+    return std::array<T, 4>{-s[1], s[0], s[2] + d, s[3] + d * (dot(lamp.lobe.half, p) / sqrt(dot(p, p)))};
+  });
+  const T mean = means[2], mean_rise = means[3];
   lamp.solid_angle = select(disk, pi<T>(), T(4)) * mean;
   const T sinRadius = lamp.lobe.sinRadius;
   const T least_rise = rise * sqrt(T(1) - sqr(sinRadius)) - sqrt(maximum(T(1) - sqr(rise), T(0))) * sinRadius;
@@ -365,24 +365,31 @@ AimedLamp<T> cut_off(AimedLamp<T> lamp, const LampPatch<T>& shining, const Vec3<
     const T d2 = dot(p.at, p.at);
     return p.area * abs(dot(axis, p.at)) / (d2 * sqrt(d2));
   };
-  // Integrates solid angle and cosine over the part: midpoint rule along u, two-point Gauss rule along v.
-  const std::array<T, 2> sums =
-      iterate(kSteps, std::array<T, 2>{T(0.5 / kSteps), T(0)}, [&](const std::array<T, 2>& s) {
-        T sum = s[1];
-        for (const double v : {0.5 - std::sqrt(1.0 / 12), 0.5 + std::sqrt(1.0 / 12)}) {
-          const auto p = part.at(s[0], T(v));
-          sum = sum + density(p) * (dot(lamp.lobe.half, p.at) / sqrt(dot(p.at, p.at)));
-        }
-        return std::array<T, 2>{s[0] + T(1.0 / kSteps), sum};
-      });
-  const T mean_rise = sums[1] / T(2 * kSteps);
-  const auto point = part.at(v1, v2);
-  lamp.wi = normalize(point.at);
+  // Integrates solid angle and cosine over the part: midpoint rule along u, two-point Gauss rule along v. The last turn
+  // of the loop is the chosen point, so that the text has one copy of part.at(): copies take long to compile.
+  // State of the loop: u, v, the sum, and a point and its density.
+  const double first = 0.5 - std::sqrt(1.0 / 12);
+  const std::array<T, 7> turns =
+      iterate(2 * kSteps + 1, std::array<T, 7>{T(0.5 / kSteps), T(first), T(0), T(0), T(0), T(0), T(0)},
+              [&](const std::array<T, 7>& s) {
+                const auto chosen = s[0] > T(1);
+                const auto p = part.at(select(chosen, v1, s[0]), select(chosen, v2, s[1]));
+                const T d = density(p), rise = dot(lamp.lobe.half, p.at) / sqrt(dot(p.at, p.at));
+                return std::array<T, 7>{select(s[1] > T(0.5), s[0] + T(1.0 / kSteps), s[0]),
+                                        T(1) - s[1],
+                                        select(chosen, s[2], s[2] + d * rise),
+                                        p.at.x,
+                                        p.at.y,
+                                        p.at.z,
+                                        d};
+              });
+  const T mean_rise = turns[2] / T(2 * kSteps);
+  lamp.wi = normalize(Vec3<T>{turns[3], turns[4], turns[5]});
   const T rise = dot(lamp.lobe.half, lamp.lobe.towards);
   const T profile = profile_of(lamp.lobe, dot(lamp.lobe.towards, lamp.wi));
   // If the lobe's normal lies below the plane, the lobe is black everywhere above it.
   const auto shows = lamp.emphasis > T(0) && mean_rise > T(0) && dot(lamp.lobe.half, normal) > T(0);
-  lamp.emphasis = select(shows, density(point) * rise / maximum(profile * mean_rise, tiny<T>()), T(0));
+  lamp.emphasis = select(shows, turns[6] * rise / maximum(profile * mean_rise, tiny<T>()), T(0));
   return lamp;
 }
 

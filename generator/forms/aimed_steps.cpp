@@ -23,8 +23,8 @@ AimedSteps record_steps() {
     outputs(program);
     return recording_of(std::move(program), {});
   };
-  const auto kept_lobe = [](const std::string& index) {
-    const auto of = [&](const char* what) { return fmt::format("lobe_{}[{}]", what, index); };
+  const auto lobe_named = [](const std::string& name) {
+    const auto of = [&](const char* what) { return fmt::format("{}_{}", name, what); };
     AimedLobe<Expr> lobe;
     lobe.towards = input_vector(of("towards"));
     lobe.half = input_vector(of("half"));
@@ -34,15 +34,14 @@ AimedSteps record_steps() {
     lobe.extent = Expr::input(of("extent"));
     return lobe;
   };
-  const auto patch_named = [](const std::string& name, const std::string& index) {
-    const auto of = [&](const char* what) { return fmt::format("{}_{}{}", name, what, index); };
+  const auto patch_named = [](const std::string& name) {
+    const auto of = [&](const char* what) { return fmt::format("{}_{}", name, what); };
     return LampPatch<Expr>{input_vector(of("centre")), input_vector(of("across")), input_vector(of("along")),
                            Expr::input(of("disk"))};
   };
-  const auto kept_patch = [&](const std::string& index) { return patch_named("lamp", "[" + index + "]"); };
-  const AimedLobe<Expr> earlier = kept_lobe("earlier");
-  const LampPatch<Expr> patch = kept_patch("lobes");
-  const LampPatch<Expr> shining = patch_named("shining", "");
+  const AimedLobe<Expr> earlier = lobe_named("earlier");
+  const LampPatch<Expr> patch = patch_named("lamp");
+  const LampPatch<Expr> shining = patch_named("shining");
   const Expr lobes = Expr::input("lobes");
   steps.beam = record_step([&](Program& p) {
     const LampBeam<Expr> beam{input_vector("beam"), Expr::input("beam_edge"), Expr::input("beam_blend")};
@@ -69,19 +68,19 @@ AimedSteps record_steps() {
     p.output("wi", lamp.wi);
     p.output("to_lamp", lamp.lobe.towards);
     p.output("to_half", lamp.lobe.half);
-    p.output("lobe_exponent[lobes]", lamp.lobe.exponent);
-    p.output("lobe_radius[lobes]", lamp.lobe.sinRadius);
-    p.output("lobe_end[lobes]", lamp.lobe.cosEnd);
-    p.output("lobe_extent[lobes]", lamp.lobe.extent);
+    p.output("lobe_exponent", lamp.lobe.exponent);
+    p.output("lobe_radius", lamp.lobe.sinRadius);
+    p.output("lobe_end", lamp.lobe.cosEnd);
+    p.output("lobe_extent", lamp.lobe.extent);
     p.output("lobe_height", lamp.height);
     p.output("lamp_emphasis", lamp.emphasis);
-    p.output("lamp_solid_angle[lobes]", lamp.solid_angle);
+    p.output("lamp_solid_angle", lamp.solid_angle);
   });
   const Vec3<Expr> horizon = input_vector("horizon");
   steps.low = record_step([&](Program& p) { p.output("lamp_low", lowest(patch, horizon)); });
   steps.cut = record_step([&](Program& p) {
     AimedLamp<Expr> lamp;
-    lamp.lobe = kept_lobe("lobes");
+    lamp.lobe = lobe_named("lobe");
     lamp.emphasis = Expr::input("lamp_emphasis");
     const AimedLamp<Expr> cut = cut_off(lamp, shining, horizon, Expr::input("v_1"), Expr::input("v_2"));
     p.output("wi", cut.wi);
@@ -90,18 +89,18 @@ AimedSteps record_steps() {
   const Rgb<Expr> value = Rgb<Expr>::input("excess");
   const Expr density = Expr::input("drawn_density");
   steps.less = record_step([&](Program& p) {
-    p.output("excess", value - Rgb<Expr>::input("lobe_value[earlier]") * evaluate(earlier, input3("wi")));
+    p.output("excess", value - Rgb<Expr>::input("earlier_value") * evaluate(earlier, input3("wi")));
   });
   steps.send = record_step([&](Program& p) {
     AimedLamp<Expr> lamp;
     lamp.height = Expr::input("lobe_height");
-    lamp.lobe.extent = Expr::input("lobe_extent[lobes]");
+    lamp.lobe.extent = Expr::input("lobe_extent");
     lamp.emphasis = Expr::input("lamp_emphasis");
-    lamp.solid_angle = Expr::input("lamp_solid_angle[lobes]");
+    lamp.solid_angle = Expr::input("lamp_solid_angle");
     const Sent<Expr> sent = send(lamp, value, density);
-    p.output("lobe_value[lobes]", sent.value);
-    p.output("lobe_weight[lobes]", sent.weight);
-    p.output("lobe_colour[lobes]", sent.colour);
+    p.output("lobe_value", sent.value);
+    p.output("lobe_weight", sent.weight);
+    p.output("lobe_colour", sent.colour);
   });
   steps.toss = record_step([&](Program& p) {
     const Toss<Expr> tossed = toss(Expr::input("u_0"), lobes);
@@ -109,13 +108,13 @@ AimedSteps record_steps() {
     p.output("u_0", tossed.u);
   });
   steps.under = record_step([&](Program& p) {
-    p.output("drawn", sample_under(kept_lobe("chosen"), Expr::input("u_1"), Expr::input("u_2")));
+    p.output("drawn", sample_under(lobe_named("chosen"), Expr::input("u_1"), Expr::input("u_2")));
   });
   const Met<Expr> before{Rgb<Expr>::input("covered"), Rgb<Expr>::input("covered_before"), Expr::input("lamp_met"),
                          Expr::input("density_under"), input3("ray")};
   steps.meet = record_step([&](Program& p) {
-    const Met<Expr> met = meet(before, kept_patch("earlier"), earlier, Expr::input("lamp_solid_angle[earlier]"),
-                               Rgb<Expr>::input("lobe_value[earlier]"), input3("drawn"));
+    const Met<Expr> met = meet(before, patch_named("earlier"), earlier, Expr::input("earlier_solid_angle"),
+                               Rgb<Expr>::input("earlier_value"), input3("drawn"));
     p.output("covered_before", met.before);  // the sum before the current lobe is added
     p.output("covered", met.covered);
     p.output("lamp_met", met.solid_angle);
