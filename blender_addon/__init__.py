@@ -31,8 +31,8 @@ def register():
     operators.register()
     ui.register()
     plot_panel.register()
-    automatic.register()
     lamps.register()
+    automatic.register()  # after lamps: its handlers read how many there are
     imports.register()
     update.register()
     console.register()

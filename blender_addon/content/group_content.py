@@ -36,15 +36,15 @@ def expected_inputs(form):
     return inputs
 
 
-def _lamp_inputs(form):
-    """A form's inputs that the shared group of lamps feeds; a form may have fewer slots than
-    that."""
+def _lamp_inputs(form, slots=None):
+    """A form's inputs that the shared group of lamps feeds, or those of its first `slots`; a form
+    may have fewer slots than the group."""
     if form.lamps > lamps.SLOTS:
         raise pack.PackError(
             f"manifest.json: {form.model.name} ({form.name}): expected at most {lamps.SLOTS} "
             f"lamps, got {form.lamps}"
         )
-    return lamps.part_names(form.lamps)
+    return lamps.part_names(form.lamps if slots is None else slots)
 
 
 def scripts(group):
@@ -124,9 +124,10 @@ def bent_normal_group(model_name):
     return formula_nodes.bent_normal_group(json.loads(source))
 
 
-def fill_with_nodes(group, form, source, twin_group):
+def fill_with_nodes(group, form, source, twin_group, slots=None):
     """Fills a group with a form of Blender's own nodes. Its sockets are those of the other forms;
-    but a twin has no use for a tangent. `twin_group`: the group of the model's twin, or None."""
+    but a twin has no use for a tangent. `twin_group`: the group of the model's twin, or None.
+    `slots`: the number of lamps, if less than the form's."""
     data = json.loads(source)
     label, is_twin = form.model.label, form.name == "twin"
     # Outputs come first, so that a twin's sockets keep the identifiers that existing files have.
@@ -141,17 +142,17 @@ def fill_with_nodes(group, form, source, twin_group):
             zip(OUTPUTS, twin.wire(group, data, normal, parameters, f"{label} (twin)"), strict=True)
         )
     else:
-        slots = []
-        if names := _lamp_inputs(form):
+        of_slots = []
+        if names := _lamp_inputs(form, slots):
             shared = _add_lamps(group)
-            slots = lamps.by_slot([shared.outputs[name] for name in names])
+            of_slots = lamps.by_slot([shared.outputs[name] for name in names])
         made = formula_nodes.wire(
             group,
             data,
             normal,
             tangent,
             parameters | formula_nodes.numbers(form.constants),
-            slots,
+            of_slots,
             label,
         )
         instead = None

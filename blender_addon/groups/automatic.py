@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Switches materials of the form "auto" when the scene's settings change: to a form of OSL scripts
-where Open Shading Language runs, and to a form of Blender's own nodes where it doesn't.
+where Open Shading Language runs, and to a form of Blender's own nodes where it doesn't, which is
+made again with more room when lamps are added.
 
 Only the contents of the models' groups are replaced. Materials keep their group nodes, and with
 them values, links, animation and drivers.
@@ -60,6 +61,13 @@ def _after_update(scene, _depsgraph):
 
 
 @persistent
+def _after_frame(scene, _depsgraph):
+    """Lamps may be shown from this frame on."""
+    if scene.session_uid == _rendering or scene == lamps.current_scene():
+        _quietly(scene)
+
+
+@persistent
 def _before_render(scene, *_):
     global _rendering
     _rendering = scene.session_uid
@@ -105,6 +113,7 @@ def _before_undo(*_):
 
 _HANDLERS = {
     "depsgraph_update_post": _after_update,
+    "frame_change_post": _after_frame,
     "object_bake_pre": _before_bake,
     "render_init": _before_render,
     "render_pre": _before_render,

@@ -20,6 +20,9 @@ from ..trees import animation
 from . import model_nodes
 from .model_nodes import AUTO, TAG
 
+#: Entry of a group's tag: how many lamps its nodes have room for, if fewer than the form's.
+SLOTS = "slots"
+
 
 def empty_tree(owner):
     """The node tree of a new material or world, emptied."""
@@ -35,10 +38,10 @@ def source_text(group):
     return script.script.as_string() if script is not None and script.script else ""
 
 
-def find_group(form, albedo=False, with_osl=None):
+def find_group(form, albedo=False, with_osl=None, slots=None):
     """The group of the current version of a form, if the file has an intact one; `albedo` as in
     ensure_group. `with_osl`: the form to take where OSL runs, of a group that adapts to the
-    scene."""
+    scene. `slots`: the number of lamps of a group inside of that, if less than the form's."""
     albedo = albedo and (with_osl or form).has_albedo_script
     automatic = with_osl and with_osl.name
     for group in bpy.data.node_groups:
@@ -46,6 +49,7 @@ def find_group(form, albedo=False, with_osl=None):
         if group.library is None and tag is not None and tag.get("digest") == form.digest:
             same = (tag["model"], tag["representation"]) == (form.model.name, form.name)
             has_albedo = tag["with_albedo"] if AUTO in tag else "albedo_inputs" in tag
+            same = same and (automatic or tag.get(SLOTS) == slots)
             if same and tag.get(AUTO) == automatic and has_albedo == albedo and is_sound(group):
                 return group
     return None
@@ -79,10 +83,16 @@ def merge_duplicates(groups):
 
 def _replace_by_local_equal(group):
     """Replaces a group by the equal one of the open file, if there is one."""
-    tag = group[TAG].to_dict()
+
+    def description(group):
+        tag = group[TAG].to_dict()
+        # An automatic group gets room for the scene's lamps.
+        return {k: v for k, v in tag.items() if k != SLOTS or AUTO not in tag}
+
+    wanted = description(group)
     for other in bpy.data.node_groups:
         same = other != group and other.library is None and TAG in other
-        if same and other[TAG].to_dict() == tag and script_problem(other) is None:
+        if same and description(other) == wanted and script_problem(other) is None:
             group.user_remap(other)
             remove_group(group)
             return
@@ -177,8 +187,23 @@ def _new_group(name, form, albedo):
         _unfinished.pop()
 
 
-def _group_of(form):
-    return ensure_group(form.model.name, form.name)
+def _group_of(form, slots=None):
+    """The group of a form of Blender's own nodes inside another group; `slots` as in
+    find_group()."""
+    if group := find_group(form, slots=slots):
+        return group
+    with _new_group(form.name, form, False) as group:
+        if slots is not None:
+            group[TAG][SLOTS] = slots
+        _fill(group, form, False)
+    return group
+
+
+def _slots_needed(form):
+    """The number of lamps that a form of Blender's own nodes gets for the scene; None for all that
+    it can have."""
+    needed = lamps.slots_needed() if form.lamps else 0
+    return needed if needed < form.lamps else None
 
 
 def _fill(group, form, albedo):
@@ -192,7 +217,8 @@ def _fill(group, form, albedo):
     stands_in = twin is not None and twin != form and "baked" not in group[TAG]
     twin_group = _group_of(twin) if stands_in else None
     if form.is_native:
-        group_content.fill_with_nodes(group, form, source, twin_group)
+        slots = group[TAG].get(SLOTS)
+        group_content.fill_with_nodes(group, form, source, twin_group, slots)
         return
     before = list(group.nodes)
     texts = [stand_in.new_text(f"{stem}.osl", source) for stem, source in sources.items()]
@@ -217,12 +243,16 @@ def automatic_groups():
 
 
 def adapt_to_scene(group, lacks_osl):
-    """Changes an automatic group to the form that a scene with or without OSL can render, if the
-    installed version made the group; sockets stay. Returns whether the form has changed. If it
-    raises CompileError, the group is as it was."""
+    """Changes an automatic group to the form that a scene with or without OSL can render, with room
+    for the scene's lamps, if the installed version made the group; sockets stay. Returns whether
+    the group has changed. If it raises CompileError, the group is as it was.
+
+    A group that has room for more lamps keeps it: lamps are often hidden and shown again.
+    """
     tag = group[TAG]
+    has_room = not lacks_osl or tag.get(SLOTS) is None or tag[SLOTS] >= lamps.slots_needed()
     # Handlers call this at each change of the scene, and computing the version takes a hash.
-    if group.nodes and (tag["representation"] == tag[AUTO]) != lacks_osl:
+    if group.nodes and (tag["representation"] == tag[AUTO]) != lacks_osl and has_room:
         return False
     if not model_nodes.is_current(group):
         return False
@@ -240,10 +270,18 @@ def _change_form(group, form):
     texts = {n.script for n in before if n.bl_idname == "ShaderNodeScript" and n.script}
     with_osl = form.model.forms[tag[AUTO]]
     try:
+        group[TAG].pop(SLOTS, None)
         if form == with_osl:
             _fill(group, form, tag["with_albedo"])
         else:
-            group_content.fill_with_form(group, form, with_osl, _group_of)
+            slots = _slots_needed(form)
+            if slots is not None:
+                group[TAG][SLOTS] = slots
+
+            def group_of(inner):
+                return _group_of(inner, slots if inner == form else None)
+
+            group_content.fill_with_form(group, form, with_osl, group_of)
     except BaseException:
         _remove_others(group, before)
         group[TAG] = tag

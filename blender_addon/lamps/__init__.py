@@ -7,7 +7,16 @@ is not installed and scripts may not run. An outdated list causes noise, and los
 lamps without a size that are missing from it; apart from that, forms stay correct.
 """
 
-from .filling import ask, count, current_scene, ensure_group, follow, last_found, refresh
+from .filling import (
+    ask,
+    count,
+    current_scene,
+    ensure_group,
+    follow,
+    last_found,
+    refresh,
+    slots_needed,
+)
 from .handlers import register, unregister
 from .kinds import of_light as kind_of
 from .kinds.light import has_importance
@@ -41,6 +50,7 @@ __all__ = [
     "register",
     "remove_unused_group",
     "sizeless",
+    "slots_needed",
     "too_many",
     "unregister",
 ]

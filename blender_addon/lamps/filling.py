@@ -200,6 +200,11 @@ def ensure_group():
     return group
 
 
+def slots_needed():
+    """The number of slots that nodes need for the lamps of the shared group."""
+    return slots.enough(shared_group.used(ensure_group()))
+
+
 def quietly(scene, depsgraph=None, **options):
     """_fill() with `busy` set, so that the handlers it triggers do nothing."""
     if memory.busy:

@@ -78,6 +78,19 @@ def sockets(group):
     return found
 
 
+def used(group):
+    """How many slots have a lamp; these are the first ones."""
+    driven = set()
+    if group.animation_data is not None:
+        driven = {curve.data_path for curve in group.animation_data.drivers}
+    for count in range(slots.SLOTS, 0, -1):
+        name = f"{slots.PARTS[-1]}{count}"
+        path = f'nodes["{name}"].inputs[0].default_value'
+        if path in driven or group.nodes[name].inputs[0].default_value != slots.EMPTY:
+            return count
+    return 0
+
+
 def written(group):
     """The current numbers of the group: floats and slots.Driven; None for a driver that the
     extension did not make."""

@@ -12,6 +12,7 @@ from ..common.i18n import say
 
 #: Number of lamps in the shared group.
 SLOTS = 8
+_ENOUGH = (0, 1, 2, 4, SLOTS)
 #: Names of a slot's vectors, to which the slot's number, from 1, is appended.
 PARTS = ("LampPlace", "LampTurn", "LampScale", "LampShape")
 #: Shapes of lamps, as numbered in the shaders (osl/brdfc.osl.in, brdfc_lamp). What the number in a
@@ -31,6 +32,12 @@ _SHAPE = 9
 def part_names(count):
     """Names of the outputs for the first `count` slots, which are also the shaders' inputs."""
     return [f"{part}{slot}" for slot in range(1, count + 1) for part in PARTS]
+
+
+def enough(count):
+    """The number of slots that nodes get for so many lamps: few numbers, so that nodes are seldom
+    made again."""
+    return next(size for size in _ENOUGH if size >= min(count, SLOTS))
 
 
 def by_slot(parts):

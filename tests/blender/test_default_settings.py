@@ -349,6 +349,103 @@ def test_undo(extension, new_file):
         assert now() == expected
 
 
+def add_lamp(scene, x, size=0.0):
+    light = bpy.data.lights.new("Another", "POINT")
+    light.energy, light.shadow_soft_size = 300.0, size
+    item = bpy.data.objects.new("Another", light)
+    item.location = (x, -3.0, 4.0)
+    scene.collection.objects.link(item)
+    return item
+
+
+def room_of(extension, material):
+    """For how many lamps a material's nodes have room, as its tag and as its nodes tell."""
+    (node,) = extension.model_nodes.group_nodes(material)
+    tag = node.node_tree[extension.model_nodes.TAG]
+    (inner,) = [
+        n.node_tree
+        for n in node.node_tree.nodes
+        if extension.model_nodes.is_ours(n)
+        and n.node_tree[extension.model_nodes.TAG]["representation"] == "nodes"
+    ]
+    groups = [n for n in inner.nodes if n.bl_idname == "ShaderNodeGroup"]
+    shared = next(n for n in groups if n.node_tree.name == "brdfc Lamps")
+    slots = sum(o.is_linked for o in shared.outputs) // 4
+    assert tag.get("slots", 8) == slots
+    return slots
+
+
+def test_nodes_have_room_for_the_lamps_of_the_scene(extension, new_file):
+    """Empty slots cost time before the first sample. A lamp without a size that has no slot in the
+    nodes would be dark, so the picture equals that of nodes with room for all lamps."""
+    few_samples(new_file, 16, 24)
+    add_camera(new_file)
+    material = extension.api.new_material("cook_torrance")
+    add_sphere(new_file, material)
+    update(new_file)
+    pictures, rooms = [render(new_file)], [room_of(extension, material)]
+    for x in (-3.0, 2.0, 5.0, 0.0):
+        last = add_lamp(new_file, x)
+        pictures.append(render(new_file))
+        rooms.append(room_of(extension, material))
+    assert rooms == [1, 2, 4, 4, 8]
+    last.hide_render = True
+    hidden = render(new_file)
+    assert room_of(extension, material) == 8
+    np.testing.assert_allclose(hidden, pictures[3], rtol=1e-5, atol=1e-6)
+    extension.api.switch_representation(material, "nodes")
+    last.hide_render = False
+    for picture in reversed(pictures):
+        np.testing.assert_allclose(render(new_file), picture, rtol=1e-5, atol=1e-6)
+        if others := [o for o in new_file.objects if o.name.startswith("Another")]:
+            bpy.data.objects.remove(others[-1])
+
+
+def test_room_for_a_lamp_that_is_shown_later(extension, new_file):
+    """A mesh that shines from some frame on has no slot before that."""
+    few_samples(new_file, 16, 24)
+    add_camera(new_file)
+    material = extension.api.new_material("cook_torrance")
+    add_sphere(new_file, material)
+    bpy.ops.mesh.primitive_plane_add(size=0.5, location=(2.0, -3.0, 2.0), rotation=(1.2, 0.0, 0.6))
+    item = bpy.context.object
+    shining = bpy.data.materials.new("Shining")
+    tree = extension.nodes.empty_tree(shining)
+    emission = tree.nodes.new("ShaderNodeEmission")
+    emission.inputs["Strength"].default_value = 300.0
+    end = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(emission.outputs[0], end.inputs[0])
+    item.data.materials.append(shining)
+    for frame, hidden in ((2, False), (1, True)):
+        item.hide_render = hidden
+        item.keyframe_insert("hide_render", frame=frame)
+    new_file.frame_set(1)
+    before = render(new_file)
+    assert room_of(extension, material) == 1
+    new_file.frame_set(2)
+    assert room_of(extension, material) == 2
+    assert render(new_file).mean() > 1.05 * before.mean()
+
+
+def test_undo_of_a_lamp(extension, new_file):
+    """Groups that were made again after an undo step was recorded are not those of the step."""
+    few_samples(new_file, 4)
+    add_camera(new_file)
+    material = extension.api.new_material("cook_torrance")
+    add_sphere(new_file, material)
+    name, pictures = material.name, []
+    for x in (None, 2.0, -2.0):
+        if x is not None:
+            add_lamp(bpy.context.scene, x)
+        bpy.ops.ed.undo_push(message="Step")
+        update(bpy.context.scene)
+        pictures.append(render(bpy.context.scene))
+    for step, expected in ((bpy.ops.ed.undo, 1), (bpy.ops.ed.undo, 0), (bpy.ops.ed.redo, 1)):
+        assert step() == {"FINISHED"}
+        np.testing.assert_allclose(render(bpy.context.scene), pictures[expected], rtol=1e-5)
+        assert room_of(extension, bpy.data.materials[name]) == (1, 2, 4)[expected]
+
+
 def test_a_saved_file_renders_without_the_extension(extension, new_file, tmp_path):
     """With the settings that it was saved with; and the stand-in for scripts with others."""
     few_samples(new_file, 16)
