@@ -48,12 +48,12 @@ def _is_clamped_as_new(at):
 def clamp_indirect(at):
     """Indirect Light is clamped, and the form receives light by random rays. Formula nodes render
     their lamps by light sampling: they are warned of only where the scene has brighter light than
-    that of a new one, or of moderate lamps if they have no mirror."""
+    moderate lamps. Materials with a mirror have the row clamp_mirror instead."""
     clamp = at.scene.cycles.sample_clamp_indirect
-    moderate = clamp >= LOW_CLAMP and at.of_scene.is_lit_moderately
-    harmless = _is_clamped_as_new(at) or (moderate and "clamp_mirror" not in at.declared)
+    harmless = _is_clamped_as_new(at) or (clamp >= LOW_CLAMP and at.of_scene.is_lit_moderately)
     spared = at.form.get("nodes") and harmless
-    return when(clamp > 0 and not spared, clamp=f"{clamp:g}")
+    said = "clamp_mirror" in at.declared and clamp_mirror(at)
+    return when(clamp > 0 and not spared and not said, clamp=f"{clamp:g}")
 
 
 def clamp_mirror(at):
