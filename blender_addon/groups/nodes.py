@@ -158,13 +158,17 @@ def is_at_work():
     return bool(_unfinished)
 
 
+def _title(model_name, parts):
+    return f"{pack.model(model_name).label} ({', '.join(parts)})"
+
+
 @contextlib.contextmanager
 def _new_group(name, form, albedo):
     """A new group with the sockets of a form, which the body of the with statement fills. If the
     body raises, the group and its parts are removed from the file."""
     known = set(bpy.data.node_groups)
     parts = [name, *([ALBEDO] if albedo and form.has_albedo_script else [])]
-    title = f"{form.model.label} ({', '.join(parts)})"
+    title = _title(form.model.name, parts)
     group = bpy.data.node_groups.new(title, "ShaderNodeTree")
     _unfinished.append(group)
     try:
@@ -266,7 +270,12 @@ def adapt_to_scene(group, lacks_osl):
 
 def _change_form(group, form):
     tag, before = group[TAG].to_dict(), list(group.nodes)
-    inner = {n.node_tree.session_uid for n in before if model_nodes.is_ours(n)}
+    # Blender brings a dragged asset again if what it brought before is gone.
+    inner = {
+        n.node_tree.session_uid
+        for n in before
+        if model_nodes.is_ours(n) and n.node_tree.library_weak_reference is None
+    }
     texts = {n.script for n in before if n.bl_idname == "ShaderNodeScript" and n.script}
     with_osl = form.model.forms[tag[AUTO]]
     try:
@@ -291,6 +300,9 @@ def _change_form(group, form):
     group[TAG]["representation"] = form.name
     group[TAG]["digest"] = form.digest
     _clear_away(inner, texts)
+    # An inner group that was made while an equal one was there has a number behind its name.
+    for made in (n.node_tree for n in group.nodes if model_nodes.is_ours(n)):
+        made.name = _title(made[TAG]["model"], [made[TAG]["representation"]])
 
 
 def empty(group):

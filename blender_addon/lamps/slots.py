@@ -12,7 +12,7 @@ from ..common.i18n import say
 
 #: Number of lamps in the shared group.
 SLOTS = 8
-_ENOUGH = (0, 1, 2, 4, SLOTS)
+_ENOUGH = (2, 4, SLOTS)
 #: Names of a slot's vectors, to which the slot's number, from 1, is appended.
 PARTS = ("LampPlace", "LampTurn", "LampScale", "LampShape")
 #: Shapes of lamps, as numbered in the shaders (osl/brdfc.osl.in, brdfc_lamp). What the number in a

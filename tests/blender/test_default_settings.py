@@ -388,7 +388,7 @@ def test_nodes_have_room_for_the_lamps_of_the_scene(extension, new_file):
         last = add_lamp(new_file, x)
         pictures.append(render(new_file))
         rooms.append(room_of(extension, material))
-    assert rooms == [1, 2, 4, 4, 8]
+    assert rooms == [2, 2, 4, 4, 8]
     last.hide_render = True
     hidden = render(new_file)
     assert room_of(extension, material) == 8
@@ -409,6 +409,7 @@ def test_room_for_a_lamp_that_is_shown_later(extension, new_file):
     add_sphere(new_file, material)
     bpy.ops.mesh.primitive_plane_add(size=0.5, location=(2.0, -3.0, 2.0), rotation=(1.2, 0.0, 0.6))
     item = bpy.context.object
+    add_lamp(new_file, -2.0)
     shining = bpy.data.materials.new("Shining")
     tree = extension.nodes.empty_tree(shining)
     emission = tree.nodes.new("ShaderNodeEmission")
@@ -421,9 +422,9 @@ def test_room_for_a_lamp_that_is_shown_later(extension, new_file):
         item.keyframe_insert("hide_render", frame=frame)
     new_file.frame_set(1)
     before = render(new_file)
-    assert room_of(extension, material) == 1
-    new_file.frame_set(2)
     assert room_of(extension, material) == 2
+    new_file.frame_set(2)
+    assert room_of(extension, material) == 4
     assert render(new_file).mean() > 1.05 * before.mean()
 
 
@@ -443,7 +444,7 @@ def test_undo_of_a_lamp(extension, new_file):
     for step, expected in ((bpy.ops.ed.undo, 1), (bpy.ops.ed.undo, 0), (bpy.ops.ed.redo, 1)):
         assert step() == {"FINISHED"}
         np.testing.assert_allclose(render(bpy.context.scene), pictures[expected], rtol=1e-5)
-        assert room_of(extension, bpy.data.materials[name]) == (1, 2, 4)[expected]
+        assert room_of(extension, bpy.data.materials[name]) == (2, 2, 4)[expected]
 
 
 def test_a_saved_file_renders_without_the_extension(extension, new_file, tmp_path):
