@@ -2,15 +2,12 @@
 """An option of all tests, and their environment."""
 
 import os
-import tempfile
 import zlib
 
 import pytest
 
-# Each run computes results anew, whatever earlier ones left in the user's cache, and fits only once
-# what several tests need.
-_CACHE = tempfile.TemporaryDirectory(prefix="brdfc-cache-")
-os.environ["BRDFC_CACHE"] = _CACHE.name
+# Each run computes results anew, whatever earlier ones left in the user's cache.
+os.environ["BRDFC_CACHE"] = ""
 #: evidence/run runs every case of the tests that are marked `sample`.
 EVERY_CASE = os.environ.get("BRDFC_EVIDENCE") == "all"
 
