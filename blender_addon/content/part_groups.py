@@ -71,24 +71,34 @@ class _Formula:
         }
 
 
+def _is_part(group):
+    return group.library is None and PART in group
+
+
 def _find(digest, among=None):
     for group in bpy.data.node_groups if among is None else among:
-        if group.library is None and group.get(PART) == digest:
+        if _is_part(group) and group[PART] == digest:
             return group
     return None
 
 
 def _appended(digest):
     """The kept group of a part, or None. If the file already has an equal part, that one stays."""
+    own = {group[PART]: group for group in bpy.data.node_groups if _is_part(group)}
     made = kept_groups.append(digest)
     wanted = _find(digest, made)
-    own = [group for group in bpy.data.node_groups if group not in made]
+    if wanted is None:
+        bpy.data.batch_remove(made)
+        return None
+    # Nodes of these groups alone can use them. Blender's own function, user_remap, and the removal
+    # of single groups examine the whole file for each group.
+    extra = {group: own[group[PART]] for group in made if group.get(PART) in own}
     for group in made:
-        if wanted is None:
-            bpy.data.node_groups.remove(group)
-        elif other := _find(group.get(PART), own):
-            group.user_remap(other)
-            bpy.data.node_groups.remove(group)
+        for node in group.nodes if group not in extra else ():
+            inner = getattr(node, "node_tree", None)
+            if inner in extra:
+                node.node_tree = extra[inner]
+    bpy.data.batch_remove(extra)
     return wanted
 
 
@@ -229,14 +239,8 @@ class Parts:
         return Parts(wiring, self.data, self.title, constants)
 
 
-def _unused():
-    for group in bpy.data.node_groups:
-        if group.library is None and PART in group and group.users == 0:
-            return group
-    return None
-
-
 def remove_unused_parts():
     """Removes the part groups that no model uses from the file."""
-    while group := _unused():
-        bpy.data.node_groups.remove(group)
+    # Removing a group may leave further ones without a user.
+    while unused := [g for g in bpy.data.node_groups if _is_part(g) and g.users == 0]:
+        bpy.data.batch_remove(unused)

@@ -23,6 +23,8 @@ _RESOURCES = tempfile.TemporaryDirectory(prefix="brdfc-test-")
 os.environ["BLENDER_USER_RESOURCES"] = _RESOURCES.name
 # Blender leaves the bytecode of each script that it compiles in the folder for temporary files.
 tempfile.tempdir = _RESOURCES.name
+# Fits that several tests need are made once in each run.
+os.environ["BRDFC_CACHE"] = str(Path(_RESOURCES.name) / "cache")
 
 PACKAGE = "bl_ext.user_default.brdfc_shaders"
 

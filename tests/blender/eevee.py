@@ -34,6 +34,7 @@ def main():
     scene.render.engine = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0, 0) else "BLENDER_EEVEE"
     scene.view_settings.view_transform = "Standard"
     scene.render.resolution_x = scene.render.resolution_y = 8
+    scene.eevee.taa_render_samples = 1
     add_camera(scene)
     add_world(scene)
     picture = render(scene)

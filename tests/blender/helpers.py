@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Small scenes and pictures for tests."""
 
+import contextlib
 import csv
 import io
 import json
@@ -90,6 +91,18 @@ def render(scene):
         scene.render.filepath = str(path)
         bpy.ops.render.render(write_still=True, scene=scene.name)
         return read_picture(path)
+
+
+@contextlib.contextmanager
+def compiled_once(scene):
+    """Pictures that are rendered inside it, of the same objects with the same materials, share the
+    compiled shaders: compiling takes longer than a small picture."""
+    scene.render.use_persistent_data = True
+    try:
+        yield
+    finally:
+        # Nothing but a picture with other settings frees what Cycles keeps.
+        scene.render.use_persistent_data = False
 
 
 def open_image_io():

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import worlds
 from goniometer import Goniometer, tilted, unit
-from helpers import add_camera, add_lamp, add_sphere, add_world, evaluate, render
+from helpers import add_camera, add_lamp, add_sphere, add_world, compiled_once, evaluate, render
 from mathutils import Vector
 
 #: Directions towards the sun; the camera is above.
@@ -99,8 +99,9 @@ def off_under_a_sun(extension, scene, tool, form, towards, samples, few_of, pict
     (lamp,) = extension.api.see_lamps(scene)
     assert lamp.slot == 1
     wo, seen = meter.wo(), []
-    for scene.cycles.seed in range(pictures):
-        seen.append(meter.measure())
+    with compiled_once(scene):
+        for scene.cycles.seed in range(pictures):
+            seen.append(meter.measure())
     picture = np.mean(seen, 0)
     spread = np.std(seen, 0, ddof=1) / math.sqrt(pictures) if pictures > 1 else 0 * picture
     found = []
@@ -197,9 +198,9 @@ def test_a_lamp_that_shines_within_a_cone(extension, empty, lamp):
         extension.api.see_lamps(empty)
         empty.cycles.samples = samples
         pictures = []
-        for seed in range(4):
-            empty.cycles.seed = seed
-            pictures.append(render(empty)[..., 1].mean())
+        with compiled_once(empty):
+            for empty.cycles.seed in range(4):
+                pictures.append(render(empty)[..., 1].mean())
         means[form] = np.mean(pictures), np.std(pictures, ddof=1) / 2
     (aimed, error), (drawn, other) = means["aimed"], means["sampled"]
     print(f"{lamp}: {aimed / drawn - 1:+.4f} +- {math.hypot(error, other) / drawn:.4f}")
@@ -269,9 +270,9 @@ def test_a_small_lamp_before_a_large_one(extension, empty):
         bpy.context.view_layer.update()
         seen = extension.api.see_lamps(empty)
         pictures = []
-        for seed in range(4):
-            empty.cycles.seed = seed
-            pictures.append(render(empty)[..., 1].mean())
+        with compiled_once(empty):
+            for empty.cycles.seed in range(4):
+                pictures.append(render(empty)[..., 1].mean())
         light[shown] = np.mean(pictures), np.std(pictures, ddof=1) / 2
     assert [(lamp.name, lamp.slot) for lamp in seen] == [(small.name, 2), (large.name, 1)]
     alone = light["large"][0] + light["small"][0]
@@ -311,10 +312,10 @@ def test_a_link_takes_the_base_away_and_no_light(extension, empty, model):
         ball.data.materials[0] = material
         bpy.context.view_layer.update()
         pictures = []
-        for seed in range(4):
-            empty.cycles.seed = seed
-            # The ball covers the central half.
-            pictures.append(render(empty)[:, 8:24, 1].reshape(32, 4, 4).mean((0, 2)))
+        with compiled_once(empty):
+            for empty.cycles.seed in range(4):
+                # The ball covers the central half.
+                pictures.append(render(empty)[:, 8:24, 1].reshape(32, 4, 4).mean((0, 2)))
         quarters[form] = np.mean(pictures, 0), np.std(pictures, 0, ddof=1) / 2
     (aimed, error), (drawn, other) = quarters["aimed"], quarters["sampled"]
     print(f"{model}: {aimed / drawn - 1} +- {np.hypot(error, other) / drawn}")

@@ -11,6 +11,7 @@ from helpers import (
     add_camera,
     add_sphere,
     add_world,
+    compiled_once,
     node_material,
     render,
     render_without_the_extension,
@@ -98,9 +99,9 @@ def test_every_model_in_a_new_file(extension, new_file, few_of):
     for osl in (False, True):
         new_file.cycles.shading_system = osl
         pictures = []
-        for seed in range(4):
-            new_file.cycles.seed = seed
-            pictures.append(render(new_file)[..., 1])
+        with compiled_once(new_file):
+            for new_file.cycles.seed in range(4):
+                pictures.append(render(new_file)[..., 1])
         forms = {form_of(extension, material) for material in materials}
         assert forms == ({"exact", "aimed"} if osl else {"nodes"})
         found[osl] = np.array([[blocks(p, i) for p in pictures] for i in range(len(models))])

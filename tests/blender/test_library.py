@@ -5,6 +5,7 @@ dragging from there. Blender's drag appends, as wm.append does with these option
 import importlib
 import json
 import re
+import shutil
 import stat
 import sys
 import uuid
@@ -25,15 +26,40 @@ def library(extension):
 
 
 @pytest.fixture(scope="module")
-def made(library):
-    """The library, made by its operator."""
+def blender(tmp_path_factory):
+    """Blender as a module has no program: this one parses its options as documented, and runs the
+    script."""
+    path = tmp_path_factory.mktemp("blender") / "blender"
+    path.write_text(
+        f"#!{sys.executable}\n"
+        "import os, sys\n"
+        "options = ['--background', '--factory-startup', '--python-exit-code', '1', '--python']\n"
+        "assert sys.argv[1:6] == options and sys.argv[7] == '--', sys.argv\n"
+        "os.execv(sys.executable, [sys.executable, *sys.argv[6:]])\n"
+    )
+    path.chmod(path.stat().st_mode | stat.S_IXUSR)
+    return path
+
+
+@pytest.fixture(scope="module")
+def made(library, blender):
+    """The library, made by its operator, and the fractions done that were shown meanwhile."""
     assert library.registered() is None
-    before = helpers.counts()
-    assert bpy.ops.brdfc.add_library() == {"FINISHED"}
+    before, shares, step = helpers.counts(), [], library.Making.step
+
+    def noting(job):
+        shares.append(step(job))
+        return shares[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(library, "_program", lambda: str(blender))
+        patch.setattr(library.Making, "step", noting)
+        assert bpy.ops.brdfc.add_library() == {"FINISHED"}
     assert helpers.counts() == before, "the open file is left alone"
     folder = library.folder()
     reuse = library.registered().import_method == "APPEND_REUSE"
-    yield SimpleNamespace(folder=folder, blend=folder / library.BLEND, reuse=reuse)
+    blend = folder / library.BLEND
+    yield SimpleNamespace(folder=folder, blend=blend, reuse=reuse, shares=shares)
     bpy.ops.brdfc.remove_library()
 
 
@@ -158,8 +184,15 @@ def test_the_second_blender_keeps_its_nodes_for_this_one(extension, made, empty)
     assert sorted(Path(folder).iterdir()) == files, "it is appended"
 
 
-@pytest.mark.long
-def test_one_click_adds_it_and_one_takes_it_away(extension, library, made, empty):
+def test_one_click_adds_it_and_one_takes_it_away(
+    extension, library, made, empty, monkeypatch, tmp_path
+):
+    # The second Blender is replaced by a program that copies what it made: it takes seconds.
+    shutil.copytree(made.folder, tmp_path / "library")
+    copy = "import shutil, sys; shutil.copytree(*sys.argv[1:], dirs_exist_ok=True)"
+    command = [sys.executable, "-c", copy, str(tmp_path / "library")]
+    monkeypatch.setattr(library, "build_command", lambda folder: [*command, folder])
+
     def buttons():
         layout = helpers.Layout()
         extension.operators.preferences.draw_library(layout)
@@ -186,26 +219,10 @@ def test_one_click_adds_it_and_one_takes_it_away(extension, library, made, empty
     assert sorted(item.name for item in libraries) == sorted(before) and library.is_current()
 
 
-@pytest.mark.long
-@pytest.mark.full
-def test_the_program_is_started_as_blender_expects_it(library, monkeypatch, tmp_path):
-    """Blender as a module has no program: this one parses its options as documented, and runs the
-    script."""
-    program = tmp_path / "blender"
-    program.write_text(
-        f"#!{sys.executable}\n"
-        "import os, sys\n"
-        "options = ['--background', '--factory-startup', '--python-exit-code', '1', '--python']\n"
-        "assert sys.argv[1:6] == options and sys.argv[7] == '--', sys.argv\n"
-        "os.execv(sys.executable, [sys.executable, *sys.argv[6:]])\n"
-    )
-    program.chmod(program.stat().st_mode | stat.S_IXUSR)
-    monkeypatch.setattr(library, "_program", lambda: str(program))
-    job, shares = library.Making(), []
-    while (share := job.step()) is not None:
-        shares.append(share)
-    assert job.result == len(library.entries()) and library.is_current()
-    assert shares == sorted(shares) and 0 <= shares[0] and shares[-1] < 1
+def test_making_it_shows_how_much_is_done(library, made):
+    *shares, last = made.shares
+    assert last is None and shares == sorted(shares) and 0 <= shares[0] and shares[-1] < 1
+    assert len(set(shares)) > 3 and library.is_current()
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,16 @@ import math
 import bpy
 import numpy as np
 import pytest
-from helpers import add_camera, add_lamp, add_sphere, add_world, albedo, render, sphere_scene
+from helpers import (
+    add_camera,
+    add_lamp,
+    add_sphere,
+    add_world,
+    albedo,
+    compiled_once,
+    render,
+    sphere_scene,
+)
 from test_aimed import SUNS, off_under_a_sun
 
 SLOW = pytest.mark.slow
@@ -110,15 +119,12 @@ def blocks_of(extension, model, values, form, light, samples, pictures=6):
     light(scene)
     bpy.context.view_layer.update()
     extension.api.see_lamps(scene)
-    # Cycles keeps the compiled shader, which takes longer than a picture.
-    scene.render.use_persistent_data = True
     found = []
-    for scene.cycles.seed in range(pictures):
-        picture = render(scene)[..., 1]
-        side = len(picture) // BLOCK
-        found.append(picture.reshape(side, BLOCK, side, BLOCK).mean((1, 3)).ravel())
-    # Nothing but a picture with other settings frees what Cycles keeps.
-    scene.render.use_persistent_data = False
+    with compiled_once(scene):
+        for scene.cycles.seed in range(pictures):
+            picture = render(scene)[..., 1]
+            side = len(picture) // BLOCK
+            found.append(picture.reshape(side, BLOCK, side, BLOCK).mean((1, 3)).ravel())
     return np.array(found)
 
 
@@ -381,14 +387,14 @@ def test_links_and_ranges(extension, empty, tool):
 def mean_of_four(extension, form, size, fill):
     """The mean of pictures with four seeds, and its standard error. `fill`: puts a material of the
     form into a scene."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene = bpy.context.scene
+    settings(extension, scene, 64, osl=form != "nodes", size=size)
+    fill(scene, form)
     found = []
-    for seed in range(4):
-        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-        scene = bpy.context.scene
-        settings(extension, scene, 64, osl=form != "nodes", size=size)
-        scene.cycles.seed = seed
-        fill(scene, form)
-        found.append(render(scene)[..., 1].mean())
+    with compiled_once(scene):
+        for scene.cycles.seed in range(4):
+            found.append(render(scene)[..., 1].mean())
     return np.mean(found), np.std(found, ddof=1) / 2
 
 

@@ -119,6 +119,20 @@ def test_exact_form_under_a_sun(extension, empty, tool, batch, request, model, v
     assert error <= 2e-5
 
 
+#: Models whose exact forms are mirrors, or closures that Cycles samples with hardly any noise: 4096
+#: samples show their albedo to 1e-4, where others need as many for 1e-3.
+QUIET = {
+    "fresnel_conductor",
+    "fresnel_dielectric",
+    "glass",
+    "glossy_specular",
+    "lambert",
+    "lambertian_specular",
+    "modified_phong",
+    "shirley_1991",
+}
+
+
 @pytest.mark.parametrize(("model", "values"), EXACT)
 def test_furnace_of_exact_form(extension, empty, tool, batch, request, model, values):
     cosines = np.linspace(0.01, 1, 64)
@@ -127,12 +141,17 @@ def test_furnace_of_exact_form(extension, empty, tool, batch, request, model, va
     replicas = np.select([cosines < 0.02, cosines < 0.06, cosines < 0.15], [512, 64, 8], 2)
     normals = tilted(np.repeat(cosines, replicas), 0.3)
 
-    def measure(cases):
+    def measured_with(samples, cases):
         found, meter = measure_each(
-            extension, "exact", cases, normals, 4096, 1, lambda m: m.add_world()
+            extension, "exact", cases, normals, samples, 1, lambda m: m.add_world()
         )
         wo = meter.wo()[: len(normals), 2] if meter else None
         return [c if isinstance(c, Exception) else (c[0], wo) for c in found]
+
+    def measure(cases):
+        quiet, noisy = [c for c in cases if c[0] in QUIET], [c for c in cases if c[0] not in QUIET]
+        of_quiet, of_noisy = iter(measured_with(512, quiet)), iter(measured_with(4096, noisy))
+        return [next(of_quiet if model in QUIET else of_noisy) for model, _ in cases]
 
     radiance, wo = batch.result(request, measure)
     first = np.cumsum(replicas) - replicas

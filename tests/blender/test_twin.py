@@ -288,14 +288,12 @@ def test_a_twin_in_eevee(extension, use_pack, tmp_path):
         assert np.abs(apart).max() < 1.5, name
 
 
-@pytest.mark.long
-@pytest.mark.slow
-def test_a_twin_is_too_bright_in_an_old_version(lean, empty):
-    material = lean.api.new_material("phong", "twin")
-    found = {f.code for f in lean.api.warnings(material, empty)}
+def test_a_twin_is_too_bright_in_an_old_version(extension, empty):
+    material = extension.api.new_material("phong", "twin")
+    found = {f.code for f in extension.api.warnings(material, empty)}
     assert ("leaning_facets" in found) == (bpy.app.version < (5, 0, 0))
     empty.render.engine = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0, 0) else "BLENDER_EEVEE"
-    assert "leaning_facets" not in {f.code for f in lean.api.warnings(material, empty)}
+    assert "leaning_facets" not in {f.code for f in extension.api.warnings(material, empty)}
 
 
 def test_all_models_that_scatter_have_a_twin_and_none_takes_it_unasked(extension):
