@@ -9,6 +9,8 @@ from .part_groups import add_group, make_group
 #: Outputs of the group that computes how a slot's lamp is seen from the shading point.
 _SEEN = [
     ["towards", "VECTOR"],
+    ["part_across", "FLOAT"],
+    ["part_along", "FLOAT"],
     ["drop", "FLOAT"],
     ["of_cones", "FLOAT"],
     ["solid_angle", "FLOAT"],
@@ -52,19 +54,16 @@ def _decoded(w, shape):
 
 def _seen_group(parts):
     """The group that computes the cones of directions towards a slot's lamp."""
-    vectors = (*SLOT, "at", "view", "normal", "true")
+    vectors = (*SLOT, "at", "view", "true")
 
     def fill(w, found):
         here = parts.on(w, found)
         known = found | _decoded(w, found["shape"])
         known |= here.add("axes", **known)
         known |= here.add("cone", **known)
-        clear = 0.0
         for i, (name, _) in enumerate(_CONES):
-            cone = here.add("cone_at", **known, index=float(i))
-            known[name] = cone["axis"]
-            clear = w.math("ADD", clear, cone["clear"])
-        return {name: (known | {"clear": clear})[name] for name, _ in outputs}
+            known[name] = here.add("cone_at", **known, index=float(i))["axis"]
+        return {name: known[name] for name, _ in outputs}
 
     outputs = _SEEN + _CODED + _AXES + _CONES
     content = [
@@ -93,7 +92,7 @@ def _lamp_group(parts):
     computations where the factor `lit` is 0."""
     vectors = (*SLOT, "towards", "at", "view", "tangent", "bitangent", "normal", "anywhere")
     of_cone = ("chord", "flat", "room", "solid_angle", "clear", "count", "of_cones")
-    numbers = (*of_cone, "most", "drop", "lit", "u_0", "u_1", "u_2")
+    numbers = (*of_cone, "part_across", "part_along", "most", "drop", "lit", "u_0", "u_1", "u_2")
     inputs = [[name, "VECTOR"] for name in vectors] + [[name, "FLOAT"] for name in numbers]
     inputs += [["kind", "FLOAT"], *_AXES, *_CONES]
     inputs += [[name, kind] for name, kind in parts.inputs("value").items() if name != "wi"]
@@ -107,7 +106,7 @@ def _lamp_group(parts):
         point = w.mix(found["flat"], point, on_flat["wi"], True)
         frame = (found["tangent"], found["bitangent"], found["normal"])
         at_point = here.add("value", **(found | {"wi": w.local(point, frame)}))
-        cone = {name: found[name] for name in of_cone}
+        cone = {name: found[name] for name in (*of_cone, "drop")}
         cone |= {"emphasis": on_flat["emphasis"], "u_2": found["u_2"]}
         lobe = here.add("lobe", **at_point, **cone)
         cones = []
@@ -252,13 +251,11 @@ def _move_aside(w, parts, lamp, at, later):
     overlaps = w.math("LESS_THAN", later["room"], lamp["reach"])
     # Constant where no later slot has a ball or a sun, so that Cycles removes what follows.
     has_later = w.math("LESS_THAN", later["room"], _FAR - 0.1)
-    # Part of a lamp that the horizon cuts may be hidden: that is left to random directions.
-    whole = w.math("GREATER_THAN", lamp["clear"], w.math("SUBTRACT", lamp["count"], 0.01))
     alone = w.math("LESS_THAN", lamp["reach"], later["others"])
     other = {"other": later["nearest"], "other_radius": later["radius"]}
     made = parts.add("aside", at=at, **lamp, **other)
     aside = w.math("MULTIPLY", lamp["flat"], has_later)
-    for condition in (overlaps, whole, alone, made["fits"]):
+    for condition in (overlaps, alone, made["fits"]):
         aside = w.math("MULTIPLY", aside, condition)
     new = {"count": 1.0, "clear": made["clear"], "chord": made["chord"]}
     lamp |= {name: w.mix(aside, lamp[name], value) for name, value in new.items()}

@@ -58,9 +58,10 @@ template <class T> LampAxes<T> lamp_axes(const LampSlot<T>& slot) {
 /// The cones of a rectangle, as seen from a shading point: equal ones in a row along the axis that looks longer.
 template <class T> struct LampCones {
   T count;
-  T sine;       ///< of their radius
-  T alone;      ///< the sine of the radius of the largest cone about the middle of the lamp
-  Vec3<T> row;  ///< half the distance between the middles of the first and the last
+  T sine;   ///< of their radius
+  T alone;  ///< the sine of the radius of the largest cone about the middle of the lamp
+  T row;    ///< half the distance between the middles of the first and the last, in units of that of the lamp;
+            ///< negative along the axis `along`
 };
 /// `centre`: from the shading point to the middle of the lamp. `many`: whether there may be more than one cone.
 ///
@@ -83,7 +84,7 @@ template <class T, class Bool> LampCones<T> cones_of_rectangle(const LampSlot<T>
   LampCones<T> cones;
   cones.count = select(many, minimum(slot.most, T(1) + more_than(kTwo) + more_than(2) + more_than(3)), T(1));
   const T moved = select(T(1.5) < cones.count, T(1) - T(1) / ratio, T(0));
-  cones.row = select(a_is_longer, a, b) * moved;
+  cones.row = select(a_is_longer, lamp.half_across, -lamp.half_along) * (moved / sqrt(c2));
   // All have the size of the farthest one.
   const T end2 = c2 + moved * (moved * select(a_is_longer, a2, b2) + T(2) * select(a_is_longer, ac, bc));
   const T volume = lamp.half_across * lamp.half_along * abs(dot(lamp.away, centre));
@@ -95,102 +96,165 @@ template <class T, class Bool> LampCones<T> cones_of_rectangle(const LampSlot<T>
 /// A lamp as seen from a shading point. Radii are given as chords (the distance between the tips of two unit vectors),
 /// which take fewer nodes than angles.
 template <class T> struct LampCone {
-  Vec3<T> towards;     ///< unit vector to the middle of the lamp
+  Vec3<T> towards;     ///< unit vector to the middle of the lamp, for a rectangle that of its part above the horizon
+  Vec3<T> aim;         ///< unit vector along the axis of a single cone, which may be within the lamp
   LampCones<T> cones;  ///< of a rectangle
-  T drop;              ///< 1 - cos of the radius of the lamp, or of each of its cones
-  T of_cones;          ///< solid angle of all cones
-  T solid_angle;       ///< the same, or 0 for a lamp that drawn directions can't hit
-  T chord;             ///< radius of the closure; for a ball or a sun it includes a seam
-  T reach;             ///< radius of a cone around the whole lamp
-  T inner;             ///< radius of the largest cone about its middle that a flat lamp fills
-  T flat;              ///< 1 for a rectangle or an ellipse, otherwise 0
-  T used;              ///< 0 for an empty slot, otherwise 1
-  T active;            ///< 0 for an empty slot and for a lamp that is left to drawn directions, otherwise 1
-  T above;             ///< 1 if a part of the lamp is above the horizon, otherwise 0
-  T clear;             ///< the number of cones above the horizon, with fractions: see cone_at()
+  T part_across, part_along;  ///< see Risen; 1 for other lamps
+  T drop;                     ///< 1 - cos of the radius of a ball or a sun
+  T of_cones;                 ///< solid angle of all cones
+  T solid_angle;              ///< the same, or 0 for a lamp that drawn directions can't hit
+  T chord;                    ///< radius of the lamp; for a flat one that of the closure, otherwise with a seam
+  T reach;                    ///< radius of a cone around the whole lamp
+  T inner;                    ///< radius of the largest cone about its middle that a flat lamp fills
+  T flat;                     ///< 1 for a rectangle or an ellipse, otherwise 0
+  T used;                     ///< 0 for an empty slot, otherwise 1
+  T active;                   ///< 0 for an empty slot and for a lamp that is left to drawn directions, otherwise 1
+  T above;                    ///< 1 if a part of the lamp is above the horizon, otherwise 0
+  T clear;                    ///< divides the light: see cone_of() and cone_aside()
 };
 
 /// Half the width of the lobe of a drawn direction, which is also its minimum distance from lamps.
 inline constexpr double kNarrow = 1e-3;
 
-/// The cone of a lamp at the point `at`, for the viewer's direction wo and the normal of the horizon, all in world
+/// The part of a rectangle above the horizon of `normal`: a rectangle with the same edges or, where the horizon crosses
+/// edges that meet, the smallest one that contains the part.
+template <class T> struct Risen {
+  Vec3<T> place;
+  T half_across, half_along;
+  T part_across, part_along;  ///< of the whole lamp's axes, negative where their ends are the ones that are left
+  T cut;                      ///< 1 if this is less than the whole lamp, otherwise 0
+  T level;                    ///< 1 if nothing of this is below the horizon, otherwise 0
+};
+template <class T>
+Risen<T> risen(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at, const Vec3<T>& normal) {
+  constexpr double kAbove = 0.98, kThinnest = 1e-3, kWhole = 0.9999;
+  const T a = dot(lamp.across, normal) * lamp.half_across, b = dot(lamp.along, normal) * lamp.half_along;
+  const T rise_a = abs(a), rise_b = abs(b), middle = dot(slot.place - at, normal);
+  // The part of an axis where, at the best point of the other axis, the lamp is above the horizon.
+  const auto part = [&](const T& own, const T& other) {
+    const T from_end = (middle + other) / maximum(own, tiny<T>()) + T(1);
+    return maximum(minimum(from_end / T(2), T(1)), T(kThinnest));
+  };
+  const T of_a = part(rise_a, rise_b), of_b = part(rise_b, rise_a);
+  const auto moved = [](const T& rise, const T& half, const T& part) {
+    return select(rise < T(0), T(-1), T(1)) * (half - half * part);
+  };
+  Risen<T> out;
+  out.half_across = lamp.half_across * of_a;
+  out.half_along = lamp.half_along * of_b;
+  out.place =
+      slot.place + lamp.across * moved(a, lamp.half_across, of_a) + lamp.along * moved(b, lamp.half_along, of_b);
+  const T top = middle + rise_a + rise_b, depth = T(2) * (rise_a * of_a + rise_b * of_b);
+  out.part_across = of_a * select(a < T(0), T(-1), T(1));
+  out.part_along = of_b * select(b < T(0), T(-1), T(1));
+  out.cut = select(of_a * of_b < T(kWhole), T(1), T(0));
+  out.level = select(depth * T(kAbove) < top, T(1), T(0));
+  return out;
+}
+
+/// The cone of a lamp at the point `at`, for the viewer's direction wo and the normal of the surface, all in world
 /// coordinates. Cycles folds what depends only on the slot, so that a ball, a sun and a rectangle each take only the
 /// nodes for their kind.
-template <class T> LampCone<T> cone_of(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
+///
+/// The surface hides what is below its horizon. There is no light in that part of a cone, or in Blender 4.5, beside an
+/// open surface, light that does not belong to it. So a cone that the horizon cuts is replaced by the largest one
+/// between the horizon and its highest point. Directions below a shading normal alone are not hidden, so f = 0 there
+/// already accounts for them.
+template <class T> LampCone<T> cone_of(const LampSlot<T>& given, const LampAxes<T>& whole, const Vec3<T>& at,
                                        const Vec3<T>& wo, const Vec3<T>& normal) {
-  /// Squared sines of radii: kWidest is where drawn directions hit a lamp often enough (tangent 1.5), kPoint is the
-  /// size given to lamps without size. kLeastRise is the minimum height of the cone's rim over the horizon of the
-  /// closure's normal.
-  constexpr double kWidest = 2.25 / 3.25, kPoint = 1e-8, kLeastRise = 0.01;
-  const T kind = slot.kind;
+  /// kWidest is the sine of the widest cone's radius, kPoint that of lamps without size. kInside is the squared sine
+  /// of a ball from which drawn directions meet it often enough. kLeastRise is the minimum height of the cone's rim
+  /// over the horizon of the closure's normal.
+  constexpr double kWidest = 0.832, kInside = 0.95, kPoint = 1e-4, kLeastRise = 0.01;
+  // f is averaged over the whole lamp, with zeros below the horizon. If a smaller part of a mesh is above the horizon,
+  // light is lost; otherwise few samples would have to carry it.
+  constexpr double kLeastPart = 0.05;
+  const T kind = given.kind;
   const auto ball = kind < T(1.5);
   const auto sun = kind > T(1.5) && kind < T(2.5);
   const auto flat = kind > T(2.5) && kind < T(4.5);
+  const auto rectangle = kind > T(2.5) && kind < T(3.5);
   const auto sky = kind > T(4.5);
+  const Risen<T> part = risen(given, whole, at, normal);
+  LampSlot<T> slot = given;
+  slot.place = select(rectangle, part.place, given.place);
+  LampAxes<T> lamp = whole;
+  lamp.half_across = select(rectangle, part.half_across, whole.half_across);
+  lamp.half_along = select(rectangle, part.half_along, whole.half_along);
   const T level = cos(slot.turn.x);
   const Vec3<T> in_sky = {level * sin(slot.turn.y), level * cos(slot.turn.y), sin(slot.turn.x)};
   const Vec3<T> centre = select(sky, in_sky, select(sun, lamp.away, slot.place - at));
   const T distance2 = dot(centre, centre), nearness = T(1) / sqrt(distance2);
   LampCone<T> cone;
+  cone.part_across = select(rectangle, part.part_across, T(1));
+  cone.part_along = select(rectangle, part.part_along, T(1));
   cone.towards = centre * nearness;
   // Squared sines of the radii.
-  const T of_ball = sqr(slot.shape.y) / distance2;
+  // Lamps with soft falloff are disks that face the surface. The second scale is 0 for a sphere and for a mesh.
+  const T radius2 = sqr(slot.shape.y);
+  const T of_ball = radius2 / (distance2 + select(T(0) < abs(slot.scale.y), radius2, T(0)));
   const T of_sun = sqr(sin(minimum(abs(slot.shape.y) / T(2), T(1.5))));
-  // Twice the squared cosine between the closure's normal and the cone's axis. The whole cone has to be above the
-  // horizon of that normal, and so does each of several.
-  const T rise2 = T(2) * dot(cone.towards, wo) + T(2);
   const T diagonal = sqrt(sqr(lamp.half_across) + sqr(lamp.half_along)) * nearness;
-  const auto stays_above = [&](const T& sine, const T& reach) {
-    return rise2 > sqr(T(2) * sine + T(2 * kLeastRise) + reach);
-  };
   const T height_of_lamp = dot(lamp.away, centre), facing = height_of_lamp * nearness;
   const T narrower = minimum(lamp.half_across, lamp.half_along) * nearness;
-  cone.cones = cones_of_rectangle(slot, lamp, centre, T(1.5) < slot.most && stays_above(narrower, diagonal));
+  // Half the length of the sum of the cone's axis and the viewer's direction is the cosine between the axis and the
+  // closure's normal. The whole cone has to be above the horizon of that normal, and so does each of several.
+  // An axis that is raised from the horizon, see below, only increases that cosine where it is small.
+  const T above_closure = sqrt(T(0.5) * dot(cone.towards, wo) + T(0.5)) - T(kLeastRise);
+  const auto several = T(1.5) < slot.most && T(0.5) < part.level && above_closure > narrower + diagonal * T(0.5);
+  cone.cones = cones_of_rectangle(slot, lamp, centre, several);
   // The largest cone about the centre that fits within a disk: its rim touches the disk where the plane recedes.
   const T tangent = narrower * facing / (T(1) + narrower * sqrt(T(1) - facing * facing)), tangent2 = tangent * tangent;
-  const T of_flat = select(kind < T(3.5), sqr(cone.cones.sine), tangent2 / (T(1) + tangent2));
+  const T of_flat = select(rectangle, sqr(cone.cones.sine), tangent2 / (T(1) + tangent2));
   const T size2 = select(ball, of_ball, select(flat, of_flat, of_sun));
-  const T sine2 = maximum(size2, T(kPoint));
-  cone.drop = sine2 / (T(1) + sqrt(T(1) - sine2));
-  cone.of_cones = cone.cones.count * cone.drop * T(2 * kPi);
+  const T size = maximum(sqrt(size2), T(kPoint));
+  // blender_addon/lamps/kinds: the first scale is 0 for a mesh, which need not fill its ball.
+  const auto solid = !ball || T(0) < abs(slot.scale.x);
+  // Between the horizon and the highest point, at `height` + `size`.
+  const T height = dot(cone.towards, normal);
+  const T risen_size = select(solid, minimum(size, (height + size) / T(2)), size), lift = size - risen_size;
+  const Vec3<T> lifted = cone.towards + normal * lift;
+  const T shorter = T(1) / sqrt(dot(lifted, lifted));
+  cone.aim = lifted * shorter;
+  const T room = minimum(above_closure, T(kWidest));
+  const T sine = maximum(minimum(risen_size * shorter, room), select(flat, T(kPoint), T(kNarrow)));
+  const auto drop_of = [](const T& sine2) { return sine2 / (T(1) + sqrt(T(1) - sine2)); };
+  const T whole_drop = drop_of(sqr(size)), drop = drop_of(sqr(sine));
+  cone.drop = whole_drop;
+  cone.of_cones = cone.cones.count * drop * T(2 * kPi);
   // blender_addon/lamps/slots.py: the first size is negative for lamps that drawn directions don't hit.
-  const auto hit = size2 > T(kPoint) && T(0) < slot.shape.y;
-  cone.solid_angle = select(hit, cone.of_cones, T(0));
+  cone.solid_angle = select(T(0) < slot.shape.y, cone.of_cones, T(0));
   // The cones of a rectangle carry all of the rectangle's light, so they must not be widened.
-  cone.chord = sqrt(T(2) * cone.drop) + select(flat, T(0), T(2 * kNarrow));
-  cone.reach = select(flat, diagonal + T(2 * kNarrow), cone.chord);
-  const T inner2 = select(kind < T(3.5), sqr(cone.cones.alone), size2);
-  cone.inner = sqrt(T(2) * inner2 / (T(1) + sqrt(T(1) - inner2)));
+  cone.chord = sqrt(T(2) * select(flat, drop, whole_drop)) + select(flat, T(0), T(2 * kNarrow));
+  cone.reach = select(flat, diagonal + T(2 * kNarrow), cone.chord) + lift;
+  const T inner = select(lift < T(kPoint) && !(rectangle && T(0.5) < part.cut),
+                         minimum(select(kind < T(3.5), cone.cones.alone, size), room), T(0));
+  cone.inner = sqrt(T(2) * drop_of(sqr(inner)));
   cone.flat = select(flat, T(1), T(0));
-  cone.cones.sine = sqrt(sine2);
   const auto used = kind > T(0.5);
-  const auto usable = used && sine2 < T(kWidest) && stays_above(cone.cones.sine, T(0));
+  const auto usable = used && select(solid, T(kLeastRise), size) < room && select(flat, T(0), size2) < T(kInside);
   const auto shines_here = select(flat, facing, T(1)) > T(0.01);
   cone.used = select(used, T(1), T(0));
   cone.active = select(usable && shines_here, T(1), T(0));
-  cone.above = select(T(0) < dot(cone.towards, normal) + cone.reach, T(1), T(0));
+  cone.above = select(T(0) < height + size, T(1), T(0));
+  // This approximates the part of a disk above a line, to 0.02.
+  const T h = maximum(minimum(height / size, T(1)), T(-1));
+  const T clear = h * (T(0.75) - T(0.25) * (h * h)) + T(0.5);
+  cone.clear = select(solid, T(1), maximum(clear, T(kLeastPart)));
   return cone;
 }
 
-/// One of the cones of a lamp, counted from 0.
-template <class T> struct ConeAt {
-  Vec3<T> towards;  ///< unit vector along its axis
-  T clear;          ///< the part of it that is above the horizon, or 0 if the lamp does not have so many cones
-};
-/// `true_normal`: of the surface, which hides what is below it. Directions below a shading normal alone are not hidden,
-/// so f = 0 there already accounts for them.
-template <class T> ConeAt<T> cone_at(const LampSlot<T>& slot, const LampCone<T>& cone, const Vec3<T>& at,
-                                     const T& index, const Vec3<T>& true_normal) {
-  const LampCones<T>& of = cone.cones;
-  const T along_row = T(2) * index / (of.count - T(1)) - T(1);
-  const Vec3<T> middle = slot.place - at + of.row * along_row;
-  ConeAt<T> out;
-  out.towards = select(T(1.5) < slot.most, middle * (T(1) / sqrt(dot(middle, middle))), cone.towards);
-  // This approximates the part of a disk above a line, to 0.02.
-  const T height = maximum(minimum(dot(out.towards, true_normal) / of.sine, T(1)), T(-1));
-  const T part = height * (T(0.75) - T(0.25) * (height * height)) + T(0.5);
-  out.clear = select(index < of.count, part, T(0));
-  return out;
+/// The solid angle of a ball or a sun, divided by that of its cone.
+template <class T> T times_cone(const LampCone<T>& cone, const T& of_cones) {
+  return maximum(cone.drop * T(2 * kPi) / of_cones, T(1));
+}
+
+/// The axis of one of the cones of a lamp, counted from 0.
+template <class T> Vec3<T> cone_at(const T& most, const LampAxes<T>& lamp, const LampCone<T>& cone, const T& index) {
+  const T along_row = T(2) * index / (cone.cones.count - T(1)) - T(1);
+  const Vec3<T> row = select(cone.cones.row < T(0), lamp.along, lamp.across);
+  const Vec3<T> axis = cone.aim + row * (cone.cones.row * along_row);
+  return select(T(1.5) < most, axis * (T(1) / sqrt(dot(axis, axis))), cone.aim);
 }
 
 /// The solid angle that a point of a rectangle or an ellipse stands for, divided by `of_cones`, that of all cones
@@ -202,11 +266,14 @@ template <class T> T emphasis_at(const LampSlot<T>& slot, const LampAxes<T>& lam
   return area * cosine / (distance2 * of_cones);
 }
 
+/// The part of a flat lamp in which its points are chosen.
+template <class T> T part_of_area(const LampCone<T>& cone) { return abs(cone.part_across * cone.part_along); }
+
 /// A cone within a flat lamp, beside a small lamp in front of it or behind it.
 template <class T> struct ConeAside {
   Vec3<T> towards;  ///< unit vector along its axis
   T chord;          ///< its radius
-  T clear;          ///< LampCone::clear, more than 1 by the share of the flat lamp that the small one covers
+  T clear;          ///< LampCone::clear
   T fits;           ///< 1 if the other lamp is small enough, otherwise 0
 };
 /// Where a direction meets the plane of a rectangle or an ellipse.
@@ -268,17 +335,20 @@ template <class T> struct FlatPoint {
   T emphasis;  ///< emphasis_at() the point
 };
 template <class T> FlatPoint<T> flat_point(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
-                                           const T& of_cones, const T& u, const T& v) {
+                                           const LampCone<T>& cone, const T& u, const T& v) {
   const auto round = slot.kind > T(3.5);
   const T radius = sqrt(u), turn = T(2) * pi<T>() * v;
-  const T x = select(round, radius * cos(turn), T(2) * u - T(1));
-  const T y = select(round, radius * sin(turn), T(2) * v - T(1));
+  const auto within = [](const T& part, const T& u) {
+    return select(part < T(0), T(-1), T(1)) - part + part * (T(2) * u - T(1));
+  };
+  const T x = select(round, radius * cos(turn), within(cone.part_across, u));
+  const T y = select(round, radius * sin(turn), within(cone.part_along, v));
   const Vec3<T> p = lamp.across * (lamp.half_across * x) + lamp.along * (lamp.half_along * y) + (slot.place - at);
   const T distance2 = dot(p, p);
   FlatPoint<T> out;
   out.wi = p * (T(1) / sqrt(distance2));
   const T cosine = maximum(dot(lamp.away, out.wi), T(0));
-  out.emphasis = emphasis_at(slot, lamp, cosine, distance2, of_cones);
+  out.emphasis = emphasis_at(slot, lamp, cosine, distance2, cone.of_cones) * part_of_area(cone);
   return out;
 }
 
@@ -309,8 +379,8 @@ template <class T> T met_part(const LampSlot<T>& slot, const LampAxes<T>& lamp, 
   const T farthest = select(round, maximum(x, T(0)) * x + maximum(y, T(0)) * y, maximum(x, y));
   const auto on_flat = farthest < T(1) && T(0) < p.slope;
   const T met = select(flat, select(on_flat, T(1), T(0)), select(length(ray - cone.towards) < cone.chord, T(1), T(0)));
-  const T emphasis = emphasis_at(slot, lamp, p.slope, sqr(p.distance), cone.solid_angle);
-  return met * part_of_lamp(cone, select(flat, emphasis, T(1)), density);
+  const T emphasis = emphasis_at(slot, lamp, p.slope, sqr(p.distance), cone.solid_angle) * part_of_area(cone);
+  return met * part_of_lamp(cone, select(flat, emphasis, times_cone(cone, cone.solid_angle)), density);
 }
 
 /// Russian roulette for a closure with a small weight, which Cycles would drop: it is kept at random, with a weight
@@ -332,17 +402,18 @@ template <class T> struct ToonLobe {
 template <class T> ToonLobe<T> toon_lobe(const LampCone<T>& cone, const T& emphasis, const T& density, const T& room,
                                          const Rgb<T>& value, const T& u) {
   constexpr double kWidened = 2e-4;
-  // f is averaged over the whole lamp, with zeros below the horizon, and the surface hides that part of the cones. If a
-  // smaller part of them is above the horizon, light is lost; otherwise few samples would have to carry it.
-  constexpr double kLeastPart = 0.05;
-  const T whole = cone.cones.count / maximum(cone.clear, T(kLeastPart) * cone.cones.count);
-  const T factor = emphasis * whole * part_of_lamp(cone, emphasis, density);
+  const T factor = emphasis * part_of_lamp(cone, emphasis, density) / cone.clear;
   const T largest = max_component(value) * factor;
   const T wide = minimum(sqrt(T(kWidened / kPi) / largest), room);
+  // A cone within its lamp has a fixed size.
   const auto is_flat = cone.flat > T(0.5);
-  const T chord = maximum(cone.chord, select(is_flat, T(0), wide)), chord2 = chord * chord;
+  const auto is_smaller = T(1.0001) < times_cone(cone, cone.of_cones);
+  const auto is_fixed = select(is_flat, T(1), select(is_smaller, T(1), T(0))) > T(0.5);
+  const T within2 = cone.of_cones / (cone.cones.count * T(kPi));
+  const T chord = select(is_fixed, select(is_flat, cone.chord, sqrt(within2)), maximum(cone.chord, wide));
+  const T chord2 = chord * chord;
   // A cone that was moved aside is smaller, and carries the same light.
-  const T extent = select(is_flat, cone.of_cones / cone.cones.count, chord2 * T(kPi));
+  const T extent = select(is_fixed, within2, chord2) * T(kPi);
   ToonLobe<T> out;
   // The angle 2 asin(chord / 2), with a relative error of 1e-4.
   out.size = chord * (T(2 / kPi) +

@@ -36,12 +36,17 @@ LampAxes<Expr> axes_input() {
   return {input3("across"), input3("along"), input3("away"), Expr::input("half_across"), Expr::input("half_along")};
 }
 
+void take_part(LampCone<Expr>& cone) {
+  cone.part_across = Expr::input("part_across");
+  cone.part_along = Expr::input("part_along");
+}
+
 }  // namespace
 
 const std::set<std::string>& node_vectors() {
-  static const std::set<std::string> names = {"across",  "along", "at",   "away", "axis",  "normal",
-                                              "other",   "place", "ray",  "row",  "scale", "shape",
-                                              "towards", "true",  "turn", "view", "wi",    "wo"};
+  static const std::set<std::string> names = {"across",  "aim",   "along", "at",   "away",  "axis",
+                                              "normal",  "other", "place", "ray",  "scale", "shape",
+                                              "towards", "true",  "turn",  "view", "wi",    "wo"};
   return names;
 }
 
@@ -80,8 +85,11 @@ NodeProgram record_axes() {
 }
 NodeProgram record_cone() {
   return recorded([](Program& p) {
-    const LampCone<Expr> cone = cone_of(slot_input(), axes_input(), input3("at"), input3("view"), input3("normal"));
+    const LampCone<Expr> cone = cone_of(slot_input(), axes_input(), input3("at"), input3("view"), input3("true"));
     p.output("towards", cone.towards);
+    p.output("aim", cone.aim);
+    p.output("part_across", cone.part_across);
+    p.output("part_along", cone.part_along);
     p.output("drop", cone.drop);
     p.output("of_cones", cone.of_cones);
     p.output("solid_angle", cone.solid_angle);
@@ -93,20 +101,17 @@ NodeProgram record_cone() {
     p.output("active", cone.active);
     p.output("above", cone.above);
     p.output("count", cone.cones.count);
-    p.output("sine", cone.cones.sine);
+    p.output("clear", cone.clear);
     p.output("row", cone.cones.row);
   });
 }
 NodeProgram record_cone_at() {
   return recorded([](Program& p) {
     LampCone<Expr> cone;
-    cone.towards = input3("towards");
+    cone.aim = input3("aim");
     cone.cones.count = Expr::input("count");
-    cone.cones.sine = Expr::input("sine");
-    cone.cones.row = input3("row");
-    const ConeAt<Expr> one = cone_at(slot_input(), cone, input3("at"), Expr::input("index"), input3("true"));
-    p.output("axis", one.towards);
-    p.output("clear", one.clear);
+    cone.cones.row = Expr::input("row");
+    p.output("axis", cone_at(Expr::input("most"), axes_input(), cone, Expr::input("index")));
   });
 }
 NodeProgram record_aside() {
@@ -121,8 +126,11 @@ NodeProgram record_aside() {
 }
 NodeProgram record_flat() {
   return recorded([](Program& p) {
-    const FlatPoint<Expr> point = flat_point(slot_input(), axes_input(), input3("at"), Expr::input("of_cones"),
-                                             Expr::input("u_0"), Expr::input("u_1"));
+    LampCone<Expr> cone;
+    cone.of_cones = Expr::input("of_cones");
+    take_part(cone);
+    const FlatPoint<Expr> point =
+        flat_point(slot_input(), axes_input(), input3("at"), cone, Expr::input("u_0"), Expr::input("u_1"));
     p.output("wi", point.wi);
     p.output("emphasis", point.emphasis);
   });
@@ -133,6 +141,8 @@ NodeProgram record_met() {
     cone.towards = input3("towards");
     cone.chord = Expr::input("chord");
     cone.solid_angle = Expr::input("solid_angle");
+    cone.drop = Expr::input("drop");
+    take_part(cone);
     p.output("met", met_part(slot_input(), axes_input(), input3("at"), cone, input3("ray"), Expr::input("density")));
   });
 }
@@ -145,7 +155,8 @@ NodeProgram record_lobe() {
     cone.solid_angle = Expr::input("solid_angle");
     cone.clear = Expr::input("clear");
     cone.cones.count = Expr::input("count");
-    const Expr emphasis = select(cone.flat > Expr(0.5), Expr::input("emphasis"), Expr(1.0));
+    cone.drop = Expr::input("drop");
+    const Expr emphasis = select(cone.flat > Expr(0.5), Expr::input("emphasis"), times_cone(cone, cone.of_cones));
     const ToonLobe<Expr> lobe = toon_lobe(cone, emphasis, Expr::input("density"), Expr::input("room"),
                                           Rgb<Expr>::input("value"), Expr::input("u_2"));
     p.output("color", lobe.color);

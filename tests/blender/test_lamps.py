@@ -645,7 +645,7 @@ def test_emissive_meshes(extension, ball, empty, kind):
     glow.location, glow.scale = (2, 3, 6), (0.2, 0.2, 0.2)
 
     def ball_at(place, radius):
-        return pytest.approx([*place, 0, 0, 0, 1, 1, 1, 1, radius, 0], rel=1e-4, abs=1e-5)
+        return pytest.approx([*place, 0, 0, 0, 0, 0, 1, 1, radius, 0], rel=1e-4, abs=1e-5)
 
     assert slots(empty) == [ball_at((2, 3, 6), 0.2)]
     glow.location.x, glow.scale = 4, (0.3, 0.3, 0.3)

@@ -16,6 +16,8 @@ from .kind import Kind
 #: the lamp separately. So a mesh must fill its ball well, as a cube does, or look small; a mesh
 #: that looks large must be a ball; and wide ones are left to random rays. Angular radii in radians.
 _FILLS_BALL, _IS_BALL = 0.5, 0.95
+#: The scale of a ball that stands for a mesh (generator/forms/node_lamps.h).
+_NO_LAMP = 0.0, 0.0, 1.0
 _LOOKS_SMALL, _LOOKS_LARGE, _LOOKS_WIDE = 0.03, 0.3, 0.4
 #: The same for rectangles and ellipses: the fraction of its bounding rectangle that a flat mesh
 #: must fill, and its maximum thickness relative to the shorter side.
@@ -249,11 +251,14 @@ def _candidate(item, name, shape, matrix):
     largest = max(range(3), key=lambda i: scales[i])
     place, size = matrix @ centre, radius * scales[largest]
     if item is None or centre.length > 1e-4 * radius or slots.is_sheared(matrix):
-        values = slots.numbers(slots.BALL, tuple(place), sizes=(size, 0.0))
+        values = slots.numbers(slots.BALL, tuple(place), scale=_NO_LAMP, sizes=(size, 0.0))
     else:
         where = tuple(slots.Driven(item, f"LOC_{axis}") for axis in "XYZ")
         values = slots.numbers(
-            slots.BALL, where, sizes=(slots.Driven(item, f"SCALE_{'XYZ'[largest]}", radius), 0.0)
+            slots.BALL,
+            where,
+            scale=_NO_LAMP,
+            sizes=(slots.Driven(item, f"SCALE_{'XYZ'[largest]}", radius), 0.0),
         )
     middle = np.array(place)
 

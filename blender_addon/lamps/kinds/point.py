@@ -10,6 +10,12 @@ from .light import Light, seen_from
 _NEW = 1000, 0.1
 
 
+def as_ball(light, place, turn, scale):
+    """slots.placed() as balls have it: the second scale is 0 for a sphere, while lamps with soft
+    falloff are disks (generator/forms/node_lamps.h)."""
+    return place, turn, scale if light.use_soft_falloff else (scale[0], 0.0, scale[2])
+
+
 class Point(Light):
     objects = frozenset({"POINT"})
 
@@ -21,7 +27,7 @@ class Point(Light):
 
     def slot(self, light, placed, sign):
         radius = slots.Driven(light, "shadow_soft_size", sign)
-        return slots.numbers(slots.BALL, *placed, (radius, 0.0))
+        return slots.numbers(slots.BALL, *as_ball(light, *placed), (radius, 0.0))
 
     def irradiance(self, light, matrix, power, points):
         squared, _ = seen_from(points, matrix)

@@ -7,7 +7,7 @@ import numpy as np
 
 from .. import slots
 from .light import ASIDE, seen_from
-from .point import Point
+from .point import Point, as_ball
 
 
 class Spot(Point):
@@ -17,7 +17,9 @@ class Spot(Point):
         # The shader finds the blend in what the number of the shape is above a whole one.
         shape = slots.Driven(light, "spot_blend", 0.45, slots.BALL)
         radius = slots.Driven(light, "shadow_soft_size", sign)
-        return slots.numbers(shape, *placed, (radius, slots.Driven(light, "spot_size")))
+        return slots.numbers(
+            shape, *as_ball(light, *placed), (radius, slots.Driven(light, "spot_size"))
+        )
 
     def irradiance(self, light, matrix, power, points):
         _, along = seen_from(points, matrix)
