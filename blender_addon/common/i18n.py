@@ -95,7 +95,10 @@ _FORM_NAMES = {
 
 
 def in_percent(share):
-    """A share as a number of percent with two digits, for sentences: "0.25", "12" or "100"."""
+    """A share as a number of percent with two digits, for sentences: "0.25", "12" or "100". What
+    rounding alone makes is "0"."""
+    if abs(share) < 1e-9:
+        return "0"
     text = f"{100 * share:.2g}"
     return f"{100 * share:.0f}" if "e+" in text else text
 

@@ -74,7 +74,8 @@ def clamp_highlight(at):
         if value is not None:
             bright = np.interp(value, highlight["values"], highlight["f_cos"])
     shows = 0 < clamp < max(LOW_CLAMP, CLAMP_OF_HIGHLIGHT * bright)
-    return when(shows and not _is_clamped_as_new(at), clamp=f"{clamp:g}")
+    said = "clamp_indirect" in at.declared and (clamp_indirect(at) or clamp_mirror(at))
+    return when(shows and not _is_clamped_as_new(at) and not said, clamp=f"{clamp:g}")
 
 
 def clamp_direct(at):

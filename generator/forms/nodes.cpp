@@ -261,8 +261,10 @@ class Nodes final : public Form {
   }
 
   FormError error(const Model& model, const Setting&) const override { return error_of_samples(model); }
-  std::vector<std::string> warnings(const Model& model, const Shader&) const override {
+  std::vector<std::string> warnings(const Model& model, const Shader& shader) const override {
     std::vector<std::string> codes = {"clamp_indirect", "clamp_direct", "orthographic_far", "normal_pass"};
+    // Toon closures are glossy ones to Cycles, also those of matte models.
+    if (shader.lamps > 0) codes.push_back("caustics");
     if (model.has_mirror()) codes.insert(codes.end(), {"multiple_importance", "filter_glossy", "clamp_mirror"});
     return codes;
   }

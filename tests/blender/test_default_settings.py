@@ -166,14 +166,14 @@ def moving_material(extension, model="lambertian_specular"):
 
 @pytest.mark.parametrize(
     ("kind", "watts", "warned"),
-    [("SUN", 1, False), ("SPOT", 1000, False), ("AREA", 10, False), ("AREA", 1000, True)],
+    [("SUN", 1, False), ("SPOT", 1000, False), ("AREA", 20, False), ("AREA", 1000, True)],
 )
 def test_a_clamp_that_takes_no_light_is_no_finding(extension, new_file, kind, watts, warned):
     """Blender clamps indirect light at 10 in a new file. Of formula nodes without a mirror that
     takes light under bright area lamps alone; mirrors show clamped lamps in other surfaces."""
     data = bpy.data.lights["Light"]
     data.type, data.energy = kind, watts
-    if kind == "AREA":
+    if kind == "AREA":  # 1 x 0.1 m
         bpy.data.objects["Light"].data.size = 1.0
 
     def codes(model):
@@ -184,8 +184,20 @@ def test_a_clamp_that_takes_no_light_is_no_finding(extension, new_file, kind, wa
 
     assert ("clamp_indirect" in codes("cook_torrance")) == warned
     assert [c for c in codes("coupled") if c.startswith("clamp")] == ["clamp_mirror"], "once"
+    assert len([c for c in codes("phong_material") if c.startswith("clamp")]) <= 1
     bpy.data.objects.remove(bpy.data.objects["Light"])
     assert "clamp_indirect" not in codes("oren_nayar"), "without a lamp"
+
+
+def test_caustics_that_are_off(extension, new_file):
+    """Then Cycles drops Toon closures behind a diffuse surface, also those of matte models."""
+    update(new_file)
+    for caustics in (True, False):
+        new_file.cycles.caustics_reflective = caustics
+        for model, lost in (("oren_nayar", not caustics), ("lambert", False)):
+            material = extension.api.new_material(model)
+            found = {w.code for w in extension.api.warnings(material, new_file)}
+            assert ("caustics" in found) == lost
 
 
 def test_a_material_follows_the_scene(extension, new_file):

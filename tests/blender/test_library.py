@@ -341,11 +341,15 @@ def test_undo_of_a_drag(extension, made, empty):
         kept = (bpy.data.materials, bpy.data.node_groups, bpy.data.texts)
         return [names(collection) for collection in kept]
 
-    before = state()
+    def used():
+        groups = [g for g in bpy.data.node_groups if g.users]
+        return names([g for g in groups if extension.model_nodes.TAG in g])
+
+    before, in_use = state(), used()
     ball.active_material = drag(made, "Brushed Steel")
     bpy.ops.ed.undo_push(message="Drag")
     after = state()
-    assert after != before and len(after[1]) == len(before[1])
+    assert after != before and used() == in_use
     assert bpy.ops.ed.undo() == {"FINISHED"}
     assert state() == before
     assert_aims_at(extension, bpy.data.materials["Ward"], bpy.data.objects["Key"])

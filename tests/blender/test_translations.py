@@ -166,5 +166,13 @@ def test_lines_fit_the_panel(extension, i18n, locale):
 
 
 def test_percentages_have_two_digits_and_no_exponent(i18n):
-    shares = {0.0025: "0.25", 0.123: "12", 0.994: "99", 0.996: "100", 12.3: "1230", 0: "0"}
+    shares = {
+        0.0025: "0.25",
+        0.123: "12",
+        0.994: "99",
+        0.996: "100",
+        12.3: "1230",
+        0: "0",
+        3e-17: "0",
+    }
     assert {share: i18n.in_percent(share) for share in shares} == shares
