@@ -70,9 +70,10 @@ def unable_device(at):
 
 
 def device_of_another_computer(at):
-    """The device is GPU Compute, and the preferences of this computer have no GPU: here the scene
-    renders on the CPU."""
-    return when(at.offers_osl and device.of_elsewhere(at.scene))
+    """Open Shading Language is on, the device is GPU Compute, and the preferences of this computer
+    have no GPU: here the scene renders on the CPU."""
+    on = at.offers_osl and at.scene.cycles.shading_system
+    return when(on and device.of_elsewhere(at.scene))
 
 
 def optix(at):

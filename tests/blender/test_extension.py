@@ -676,6 +676,9 @@ def test_warning_device_of_another_computer(extension, empty, monkeypatch):
     (finding,) = extension.api.warnings(material, empty)
     assert (finding.code, finding.severity) == ("device_elsewhere", "WARNING")
     assert "GPU Compute" in finding.message
+    empty.cycles.shading_system = False
+    assert codes(extension, material, empty) == ["osl_off"]
+    empty.cycles.shading_system = True
     assert extension.api.enable_osl(empty) == ["Device changed from GPU Compute to the CPU"]
     assert empty.cycles.device == "CPU"
     assert codes(extension, material, empty) == []
