@@ -4,7 +4,7 @@ and the Toon BSDFs that carry their light (generator/forms/node_lamps.h has the 
 
 from ..lamps import slots
 from . import svm_constants
-from .part_groups import add_group, make_group
+from .part_groups import PART, add_group, make_group
 
 #: Outputs of the group that computes how a slot's lamp is seen from the shading point.
 _SEEN = [
@@ -21,7 +21,10 @@ _SEEN = [
     ["used", "FLOAT"],
     ["active", "FLOAT"],
     ["above", "FLOAT"],
-    ["count", "FLOAT"],
+    ["aim", "VECTOR"],
+    ["layout", "FLOAT"],
+    ["moved", "FLOAT"],
+    ["alone", "FLOAT"],
     ["clear", "FLOAT"],
 ]
 #: Vectors of a slot, and what its shape's first number consists of.
@@ -34,8 +37,13 @@ _AXES = [
     ["half_across", "FLOAT"],
     ["half_along", "FLOAT"],
 ]
-#: Axes of the cones of a lamp.
-_CONES = [[f"axis {i}", "VECTOR"] for i in range(slots.MOST_CONES)]
+#: The parts of a lamp, each with a cone: inputs of the parts "flat" and "cone_at".
+_PARTS = [
+    {"index": float(i), "side_across": 2.0 * (i % 2) - 1, "side_along": 2.0 * (i // 2) - 1}
+    for i in range(slots.MOST_CONES)
+]
+#: Number of cones in two rows (generator/forms/node_lamps.h, kGrid).
+_GRID = 8.0
 #: Larger than the angle between any two directions.
 _FAR = 4.0
 
@@ -61,17 +69,10 @@ def _seen_group(parts):
         known = found | _decoded(w, found["shape"])
         known |= here.add("axes", **known)
         known |= here.add("cone", **known)
-        for i, (name, _) in enumerate(_CONES):
-            known[name] = here.add("cone_at", **known, index=float(i))["axis"]
         return {name: known[name] for name, _ in outputs}
 
-    outputs = _SEEN + _CODED + _AXES + _CONES
-    content = [
-        "seen",
-        slots.CODE,
-        slots.MOST_CONES,
-        [parts.data[name] for name in ("axes", "cone", "cone_at")],
-    ]
+    outputs = _SEEN + _CODED + _AXES
+    content = ["seen", slots.CODE, [parts.data[name] for name in ("axes", "cone")]]
     inputs = [[name, "VECTOR"] for name in vectors]
     return make_group("lamp seen", content, inputs, outputs, fill)
 
@@ -86,18 +87,25 @@ def _point_of(w, towards, drop, anywhere, u):
     return w.vector("ADD", w.scaled(towards, cosine), w.scaled(beside, sine))
 
 
-def _lamp_group(parts):
-    """The group that makes a lamp's closures, one for each of its cones, which carry the model's
-    value at one of its points, or the part of it that random directions leave. Cycles skips its
-    computations where the factor `lit` is 0."""
-    vectors = (*SLOT, "towards", "at", "view", "tangent", "bitangent", "normal", "anywhere")
-    of_cone = ("chord", "flat", "room", "solid_angle", "clear", "count", "of_cones")
-    numbers = (*of_cone, "part_across", "part_along", "most", "drop", "lit", "u_0", "u_1", "u_2")
-    inputs = [[name, "VECTOR"] for name in vectors] + [[name, "FLOAT"] for name in numbers]
-    inputs += [["kind", "FLOAT"], *_AXES, *_CONES]
+#: Inputs of the groups below, besides those of the model's formula.
+_VECTORS = (*SLOT, "towards", "aim", "at", "view", "tangent", "bitangent", "normal", "anywhere")
+_OF_CONE = ("chord", "flat", "room", "solid_angle", "clear", "layout", "of_cones", "drop")
+_NUMBERS = ("kind", "most", "moved", "alone", "part_across", "part_along", "u_0", "u_1", "u_2", *_OF_CONE)
+
+
+def _inputs(parts):
+    """Names and kinds of what a lamp's closures need."""
+    inputs = [[name, "VECTOR"] for name in _VECTORS] + [[name, "FLOAT"] for name in _NUMBERS]
+    inputs += _AXES
     inputs += [[name, kind] for name, kind in parts.inputs("value").items() if name != "wi"]
     known = {name for name, _ in inputs}
-    inputs += [[name, "FLOAT"] for name in svm_constants.VALUES if name not in known]
+    return inputs + [[name, "FLOAT"] for name in svm_constants.VALUES if name not in known]
+
+
+def _part_group(parts):
+    """The group that makes the closure of a part of a lamp: a cone, which carries the model's value
+    at a point of the part, or what random directions leave of it."""
+    inputs = _inputs(parts) + [[name, "FLOAT"] for name in _PARTS[0]]
 
     def fill(w, found):
         here = parts.on(w, found)
@@ -106,21 +114,38 @@ def _lamp_group(parts):
         point = w.mix(found["flat"], point, on_flat["wi"], True)
         frame = (found["tangent"], found["bitangent"], found["normal"])
         at_point = here.add("value", **(found | {"wi": w.local(point, frame)}))
-        cone = {name: found[name] for name in (*of_cone, "drop")}
+        cone = {name: found[name] for name in _OF_CONE}
         cone |= {"emphasis": on_flat["emphasis"], "u_2": found["u_2"]}
-        lobe = here.add("lobe", **at_point, **cone)
-        cones = []
-        for i, (name, _) in enumerate(_CONES):
-            half = w.half(found[name], found["view"])
-            toon = w.toon(lobe["color"], lobe["size"], half)
-            # The first factor is a constant, with which Cycles removes what a lamp never has.
-            may_exist = w.math("GREATER_THAN", found["most"], i + 0.5)
-            exists = w.math("MULTIPLY", may_exist, w.math("GREATER_THAN", found["count"], i + 0.5))
-            cones.append(w.shown(exists, toon) if i > 0 else toon)
-        return {"BSDF": w.shown(found["lit"], w.sum(cones))}
+        placed = here.add("cone_at", **found)
+        lobe = here.add("lobe", **at_point, **cone | {"chord": placed["chord"]})
+        return {"BSDF": w.toon(lobe["color"], lobe["size"], w.half(placed["axis"], found["view"]))}
 
-    used = ("value", "flat", "lobe")
-    content = ["lamp", len(_CONES), {name: parts.data[name] for name in used}]
+    used = ("value", "flat", "cone_at", "lobe")
+    content = ["part of lamp", {name: parts.data[name] for name in used}]
+    title = f"{parts.title}: part of lamp"
+    return make_group(title, content, inputs, [["BSDF", "SHADER"]], fill)
+
+
+def _lamp_group(parts):
+    """The group that makes a lamp's closures, one for each of its parts. Cycles skips the
+    computations of closures whose factor is 0."""
+    part, inputs = _part_group(parts), _inputs(parts) + [["lit", "FLOAT"]]
+
+    def fill(w, found):
+        closures = []
+        is_grid = w.math("GREATER_THAN", found["layout"], _GRID / 2)
+        count = w.mix(is_grid, w.math("ABSOLUTE", found["layout"]), 4.0)
+        for i, place in enumerate(_PARTS):
+            closure = add_group(w, part, found | place, f"part {i}")["BSDF"]
+            if i > 0:
+                # The first factor is a constant, with which Cycles removes what a lamp never has.
+                may_exist = w.math("GREATER_THAN", found["most"], i + 0.5)
+                exists = w.math("MULTIPLY", may_exist, w.math("GREATER_THAN", count, i + 0.5))
+                closure = w.shown(exists, closure)
+            closures.append(closure)
+        return {"BSDF": w.shown(found["lit"], w.sum(closures))}
+
+    content = ["lamp", len(_PARTS), _GRID, part[PART]]
     return make_group(f"{parts.title}: lamp", content, inputs, [["BSDF", "SHADER"]], fill)
 
 
@@ -170,7 +195,7 @@ def _later_group():
 
 #: What changes where a lamp has a cone beside another lamp. Only so many lamps can have that, from
 #: the widest, since SVM keeps the numbers of all lamps at a time.
-_MOVED = ("count", "clear", "chord", "axis 0")
+_MOVED = ("layout", "clear", "chord", "aim")
 _MOST_ASIDE = 4
 #: What _keep_apart() needs to know of a lamp besides the inputs of the part "aside".
 _BOUNDS = ("towards", "reach", "flat", "used", "active", "above", "plane", *_MOVED)
@@ -181,7 +206,7 @@ _DECIDED = ("shown", "lit", "room", *_MOVED)
 def _keep_apart(w, parts, lamps, at, widest):
     """Decides which lamps get closures, where, and how wide each may be, in a group that all models
     share; sets _DECIDED of each lamp."""
-    kinds = {name: kind for name, kind in [*_SEEN, *_CODED, *_AXES, *_CONES]}
+    kinds = {name: kind for name, kind in [*_SEEN, *_CODED, *_AXES]}
     kinds |= dict.fromkeys(SLOT, "VECTOR")
     of_lamp = [*_BOUNDS, *parts.inputs("aside")]
     taken = [name for name in dict.fromkeys(of_lamp) if name in kinds]
@@ -257,9 +282,9 @@ def _move_aside(w, parts, lamp, at, later):
     aside = w.math("MULTIPLY", lamp["flat"], has_later)
     for condition in (overlaps, alone, made["fits"]):
         aside = w.math("MULTIPLY", aside, condition)
-    new = {"count": 1.0, "clear": made["clear"], "chord": made["chord"]}
+    new = {"layout": 1.0, "clear": made["clear"], "chord": made["chord"]}
     lamp |= {name: w.mix(aside, lamp[name], value) for name, value in new.items()}
-    lamp[_CONES[0][0]] = w.mix(aside, lamp[_CONES[0][0]], made["axis"], True)
+    lamp["aim"] = w.mix(aside, lamp["aim"], made["axis"], True)
     return aside
 
 

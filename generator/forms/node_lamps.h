@@ -55,24 +55,33 @@ template <class T> LampAxes<T> lamp_axes(const LampSlot<T>& slot) {
   return axes;
 }
 
-/// The cones of a rectangle, as seen from a shading point: equal ones in a row along the axis that looks longer.
+/// How the cones of a rectangle are arranged: 1 to 4 of them in a row along the axis `across`, or -2 to -4 along the
+/// axis `along`, or kGrid for two by two.
+inline constexpr double kGrid = 8;
+template <class T> auto in_grid(const T& layout) { return T(kGrid / 2) < layout; }
+template <class T> T count_of(const T& layout) { return select(in_grid(layout), T(4), abs(layout)); }
+
+/// The cones of a rectangle, as seen from a shading point.
 template <class T> struct LampCones {
-  T count;
+  T layout;
   T sine;   ///< of their radius
   T alone;  ///< the sine of the radius of the largest cone about the middle of the lamp
-  T row;    ///< half the distance between the middles of the first and the last, in units of that of the lamp;
-            ///< negative along the axis `along`
+  T moved;  ///< from the middle of the lamp to those of the outermost cones, in units of the half axis, divided by the
+            ///< distance of the lamp
 };
-/// `centre`: from the shading point to the middle of the lamp. `many`: whether there may be more than one cone.
+/// `centre`: from the shading point to the middle of the lamp. `many`: whether there may be more than one cone. `wide`:
+/// whether the model varies over the lamp.
 ///
 /// A cone lies within a rectangle if it lies on the inner side of the four planes through the shading point and an
 /// edge. If A and B are half the lamp's axes and C is its middle, the plane through the edge at C + A has the normal
 /// B x (C + A). So the sine of the angle between C and that plane is |det(A, B, C)| / (|C| |B x (C + A)|). For the
 /// point C + tA of the lamp it is (1 - t) times that, with |C + tA| in place of |C|.
-template <class T, class Bool> LampCones<T> cones_of_rectangle(const LampSlot<T>& slot, const LampAxes<T>& lamp,
-                                                               const Vec3<T>& centre, const Bool& many) {
-  // Of a rectangle that looks shorter than this, for its width, two cones cover hardly more than one.
-  constexpr double kTwo = 1.1;
+template <class T, class Many, class Wide>
+LampCones<T> cones_of_rectangle(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& centre,
+                                const Many& many, const Wide& wide) {
+  // Of a rectangle that looks shorter than kTwo, for its width, two cones in a row cover hardly more than one; of one
+  // that looks longer than kLong, two by two cover less than a row.
+  constexpr double kTwo = 1.1, kLong = 1.5;
   const Vec3<T> a = lamp.across * lamp.half_across, b = lamp.along * lamp.half_along;
   const T a2 = sqr(lamp.half_across), b2 = sqr(lamp.half_along), c2 = dot(centre, centre);
   const T ac = abs(dot(a, centre)), bc = abs(dot(b, centre));
@@ -82,13 +91,17 @@ template <class T, class Bool> LampCones<T> cones_of_rectangle(const LampSlot<T>
   const T longer2 = maximum(at_a2, at_b2), ratio = sqrt(longer2 / minimum(at_a2, at_b2));
   const auto more_than = [&](double limit) { return select(T(limit) < ratio, T(1), T(0)); };
   LampCones<T> cones;
-  cones.count = select(many, minimum(slot.most, T(1) + more_than(kTwo) + more_than(2) + more_than(3)), T(1));
-  const T moved = select(T(1.5) < cones.count, T(1) - T(1) / ratio, T(0));
-  cones.row = select(a_is_longer, lamp.half_across, -lamp.half_along) * (moved / sqrt(c2));
+  const auto grid = many && wide && ratio < T(kLong);
+  const T in_row = select(many, minimum(slot.most, T(1) + more_than(kTwo) + more_than(2) + more_than(3)), T(1));
+  const T row = select(T(1.5) < in_row, T(1) - T(1) / ratio, T(0));
+  cones.layout = select(grid, T(kGrid), select(a_is_longer, in_row, -in_row));
+  const T moved = select(grid, T(0.5), row);
+  cones.moved = moved / sqrt(c2);
   // All have the size of the farthest one.
-  const T end2 = c2 + moved * (moved * select(a_is_longer, a2, b2) + T(2) * select(a_is_longer, ac, bc));
+  const T along_row = row * (row * select(a_is_longer, a2, b2) + T(2) * select(a_is_longer, ac, bc));
+  const T end2 = c2 + select(grid, (a2 + b2) / T(4) + ac + bc, along_row);
   const T volume = lamp.half_across * lamp.half_along * abs(dot(lamp.away, centre));
-  cones.sine = volume / sqrt(longer2 * end2);
+  cones.sine = volume / sqrt(longer2 * end2) * select(grid, T(0.5), T(1));
   cones.alone = volume / sqrt(longer2 * c2);
   return cones;
 }
@@ -169,6 +182,8 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& given, const LampAxes<
   // f is averaged over the whole lamp, with zeros below the horizon. If a smaller part of a mesh is above the horizon,
   // light is lost; otherwise few samples would have to carry it.
   constexpr double kLeastPart = 0.05;
+  // Half the diagonal of a rectangle over its distance, above which it has two cones by two.
+  constexpr double kWide = 0.1;
   const T kind = given.kind;
   const auto ball = kind < T(1.5);
   const auto sun = kind > T(1.5) && kind < T(2.5);
@@ -202,7 +217,7 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& given, const LampAxes<
   // An axis that is raised from the horizon, see below, only increases that cosine where it is small.
   const T above_closure = sqrt(T(0.5) * dot(cone.towards, wo) + T(0.5)) - T(kLeastRise);
   const auto several = T(1.5) < slot.most && T(0.5) < part.level && above_closure > narrower + diagonal * T(0.5);
-  cone.cones = cones_of_rectangle(slot, lamp, centre, several);
+  cone.cones = cones_of_rectangle(slot, lamp, centre, several, T(kWide) < diagonal);
   // The largest cone about the centre that fits within a disk: its rim touches the disk where the plane recedes.
   const T tangent = narrower * facing / (T(1) + narrower * sqrt(T(1) - facing * facing)), tangent2 = tangent * tangent;
   const T of_flat = select(rectangle, sqr(cone.cones.sine), tangent2 / (T(1) + tangent2));
@@ -221,7 +236,7 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& given, const LampAxes<
   const auto drop_of = [](const T& sine2) { return sine2 / (T(1) + sqrt(T(1) - sine2)); };
   const T whole_drop = drop_of(sqr(size)), drop = drop_of(sqr(sine));
   cone.drop = whole_drop;
-  cone.of_cones = cone.cones.count * drop * T(2 * kPi);
+  cone.of_cones = count_of(cone.cones.layout) * drop * T(2 * kPi);
   // blender_addon/lamps/slots.py: the first size is negative for lamps that drawn directions don't hit.
   cone.solid_angle = select(T(0) < slot.shape.y, cone.of_cones, T(0));
   // The cones of a rectangle carry all of the rectangle's light, so they must not be widened.
@@ -249,12 +264,32 @@ template <class T> T times_cone(const LampCone<T>& cone, const T& of_cones) {
   return maximum(cone.drop * T(2 * kPi) / of_cones, T(1));
 }
 
-/// The axis of one of the cones of a lamp, counted from 0.
-template <class T> Vec3<T> cone_at(const T& most, const LampAxes<T>& lamp, const LampCone<T>& cone, const T& index) {
-  const T along_row = T(2) * index / (cone.cones.count - T(1)) - T(1);
-  const Vec3<T> row = select(cone.cones.row < T(0), lamp.along, lamp.across);
-  const Vec3<T> axis = cone.aim + row * (cone.cones.row * along_row);
-  return select(T(1.5) < most, axis * (T(1) / sqrt(dot(axis, axis))), cone.aim);
+/// One of a lamp's cones, which stands for a part of the lamp.
+template <class T> struct LampPart {
+  T index;          ///< from 0
+  T across, along;  ///< -1 or 1: where it is among two by two
+};
+
+/// A cone of a lamp.
+template <class T> struct ConeOfPart {
+  Vec3<T> axis;
+  T chord;  ///< its radius
+};
+template <class T>
+ConeOfPart<T> cone_at(const T& most, const LampAxes<T>& lamp, const LampCone<T>& cone, const LampPart<T>& part) {
+  const T layout = cone.cones.layout;
+  const auto grid = in_grid(layout), along = layout < T(0);
+  const T in_row = T(2) * part.index / (abs(layout) - T(1)) - T(1);
+  const T x = select(grid, part.across, select(along, T(0), in_row)) * abs(cone.part_across);
+  const T y = select(grid, part.along, select(along, in_row, T(0))) * abs(cone.part_along);
+  const Vec3<T> axis =
+      cone.aim + (lamp.across * (lamp.half_across * x) + lamp.along * (lamp.half_along * y)) * cone.cones.moved;
+  const T shorter = T(1) / sqrt(dot(axis, axis));
+  // The nearer a part is, the larger it looks.
+  const T sine = cone.cones.alone * minimum(shorter * select(grid, T(0.5), T(1)), T(1));
+  const T drop2 = T(2) * sqr(sine) / (T(1) + sqrt(T(1) - sqr(sine)));
+  const auto several = T(1.5) < most && T(1.5) < count_of(layout);
+  return {select(several, axis * shorter, cone.aim), select(several, sqrt(drop2), cone.chord)};
 }
 
 /// The solid angle that a point of a rectangle or an ellipse stands for, divided by `of_cones`, that of all cones
@@ -334,19 +369,26 @@ template <class T> struct FlatPoint {
   Vec3<T> wi;  ///< unit vector to the point
   T emphasis;  ///< emphasis_at() the point
 };
+/// The point of a rectangle lies in the given part. Points of neighbouring parts are mirrored, so that they are on the
+/// whole less noisy.
 template <class T> FlatPoint<T> flat_point(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
-                                           const LampCone<T>& cone, const T& u, const T& v) {
+                                           const LampCone<T>& cone, const LampPart<T>& part, const T& u, const T& v) {
   const auto round = slot.kind > T(3.5);
   const T radius = sqrt(u), turn = T(2) * pi<T>() * v;
-  const auto within = [](const T& part, const T& u) {
-    return select(part < T(0), T(-1), T(1)) - part + part * (T(2) * u - T(1));
-  };
-  const T x = select(round, radius * cos(turn), within(cone.part_across, u));
-  const T y = select(round, radius * sin(turn), within(cone.part_along, v));
-  const Vec3<T> p = lamp.across * (lamp.half_across * x) + lamp.along * (lamp.half_along * y) + (slot.place - at);
-  const T distance2 = dot(p, p);
+  const T layout = cone.cones.layout;
+  const auto grid = in_grid(layout), along = layout < T(0);
+  // From -1 to 1 in the part, then in the part of the lamp above the horizon, then in the whole lamp.
+  const T p = (T(1) - T(2) * u) * part.across, q = (T(2) * v - T(1)) * (part.across * part.along);
+  const auto in_row = [&](const T& p) { return (p + T(2) * part.index + T(1)) / abs(layout) - T(1); };
+  const T x_above = select(grid, (p + part.across) / T(2), select(along, p, in_row(p)));
+  const T y_above = select(grid, (q + part.along) / T(2), select(along, in_row(q), q));
+  const auto within = [](const T& part, const T& x) { return select(part < T(0), T(-1), T(1)) - part + part * x; };
+  const T x = select(round, radius * cos(turn), within(cone.part_across, x_above));
+  const T y = select(round, radius * sin(turn), within(cone.part_along, y_above));
+  const Vec3<T> point = lamp.across * (lamp.half_across * x) + lamp.along * (lamp.half_along * y) + (slot.place - at);
+  const T distance2 = dot(point, point);
   FlatPoint<T> out;
-  out.wi = p * (T(1) / sqrt(distance2));
+  out.wi = point * (T(1) / sqrt(distance2));
   const T cosine = maximum(dot(lamp.away, out.wi), T(0));
   out.emphasis = emphasis_at(slot, lamp, cosine, distance2, cone.of_cones) * part_of_area(cone);
   return out;
@@ -409,7 +451,7 @@ template <class T> ToonLobe<T> toon_lobe(const LampCone<T>& cone, const T& empha
   const auto is_flat = cone.flat > T(0.5);
   const auto is_smaller = T(1.0001) < times_cone(cone, cone.of_cones);
   const auto is_fixed = select(is_flat, T(1), select(is_smaller, T(1), T(0))) > T(0.5);
-  const T within2 = cone.of_cones / (cone.cones.count * T(kPi));
+  const T within2 = cone.of_cones / (count_of(cone.cones.layout) * T(kPi));
   const T chord = select(is_fixed, select(is_flat, cone.chord, sqrt(within2)), maximum(cone.chord, wide));
   const T chord2 = chord * chord;
   // A cone that was moved aside is smaller, and carries the same light.

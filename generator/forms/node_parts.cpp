@@ -36,6 +36,9 @@ LampAxes<Expr> axes_input() {
   return {input3("across"), input3("along"), input3("away"), Expr::input("half_across"), Expr::input("half_along")};
 }
 
+LampPart<Expr> part_input() {
+  return {Expr::input("index"), Expr::input("side_across"), Expr::input("side_along")};
+}
 void take_part(LampCone<Expr>& cone) {
   cone.part_across = Expr::input("part_across");
   cone.part_along = Expr::input("part_along");
@@ -100,18 +103,24 @@ NodeProgram record_cone() {
     p.output("used", cone.used);
     p.output("active", cone.active);
     p.output("above", cone.above);
-    p.output("count", cone.cones.count);
+    p.output("layout", cone.cones.layout);
     p.output("clear", cone.clear);
-    p.output("row", cone.cones.row);
+    p.output("moved", cone.cones.moved);
+    p.output("alone", cone.cones.alone);
   });
 }
 NodeProgram record_cone_at() {
   return recorded([](Program& p) {
     LampCone<Expr> cone;
     cone.aim = input3("aim");
-    cone.cones.count = Expr::input("count");
-    cone.cones.row = Expr::input("row");
-    p.output("axis", cone_at(Expr::input("most"), axes_input(), cone, Expr::input("index")));
+    cone.cones.layout = Expr::input("layout");
+    cone.cones.moved = Expr::input("moved");
+    take_part(cone);
+    cone.cones.alone = Expr::input("alone");
+    cone.chord = Expr::input("chord");
+    const ConeOfPart<Expr> found = cone_at(Expr::input("most"), axes_input(), cone, part_input());
+    p.output("axis", found.axis);
+    p.output("chord", found.chord);
   });
 }
 NodeProgram record_aside() {
@@ -129,8 +138,9 @@ NodeProgram record_flat() {
     LampCone<Expr> cone;
     cone.of_cones = Expr::input("of_cones");
     take_part(cone);
-    const FlatPoint<Expr> point =
-        flat_point(slot_input(), axes_input(), input3("at"), cone, Expr::input("u_0"), Expr::input("u_1"));
+    cone.cones.layout = Expr::input("layout");
+    const FlatPoint<Expr> point = flat_point(slot_input(), axes_input(), input3("at"), cone, part_input(),
+                                             Expr::input("u_0"), Expr::input("u_1"));
     p.output("wi", point.wi);
     p.output("emphasis", point.emphasis);
   });
@@ -154,7 +164,7 @@ NodeProgram record_lobe() {
     cone.of_cones = Expr::input("of_cones");
     cone.solid_angle = Expr::input("solid_angle");
     cone.clear = Expr::input("clear");
-    cone.cones.count = Expr::input("count");
+    cone.cones.layout = Expr::input("layout");
     cone.drop = Expr::input("drop");
     const Expr emphasis = select(cone.flat > Expr(0.5), Expr::input("emphasis"), times_cone(cone, cone.of_cones));
     const ToonLobe<Expr> lobe = toon_lobe(cone, emphasis, Expr::input("density"), Expr::input("room"),
