@@ -48,31 +48,33 @@ _GRID = 8.0
 _FAR = 4.0
 
 
-def _decoded(w, shape):
-    """The numbers that lamps/slots.py combines in the first number of a slot's shape."""
+def _decoded(w, shape, cones):
+    """The numbers that lamps/slots.py combines in the first number of a slot's shape. `cones`: how
+    many a lamp may have here."""
     whole = w.separate(shape)[0]
     code = w.math("FLOOR", w.math("DIVIDE", whole, slots.CODE))
     plane = w.math("FLOOR", w.math("DIVIDE", code, slots.CODE))
+    most = w.math("MULTIPLY_ADD", plane, -slots.CODE, w.math("ADD", code, 1.0))
     return {
         "kind": w.math("MULTIPLY_ADD", code, -slots.CODE, whole),
-        "most": w.math("MULTIPLY_ADD", plane, -slots.CODE, w.math("ADD", code, 1.0)),
+        "most": w.math("MINIMUM", most, float(cones)),
         "plane": plane,
     }
 
 
-def _seen_group(parts):
+def _seen_group(parts, cones):
     """The group that computes the cones of directions towards a slot's lamp."""
     vectors = (*SLOT, "at", "view", "true")
 
     def fill(w, found):
         here = parts.on(w, found)
-        known = found | _decoded(w, found["shape"])
+        known = found | _decoded(w, found["shape"], cones)
         known |= here.add("axes", **known)
         known |= here.add("cone", **known)
         return {name: known[name] for name, _ in outputs}
 
     outputs = _SEEN + _CODED + _AXES
-    content = ["seen", slots.CODE, [parts.data[name] for name in ("axes", "cone")]]
+    content = ["seen", slots.CODE, cones, [parts.data[name] for name in ("axes", "cone")]]
     inputs = [[name, "VECTOR"] for name in vectors]
     return make_group("lamp seen", content, inputs, outputs, fill)
 
@@ -90,7 +92,8 @@ def _point_of(w, towards, drop, anywhere, u):
 #: Inputs of the groups below, besides those of the model's formula.
 _VECTORS = (*SLOT, "towards", "aim", "at", "view", "tangent", "bitangent", "normal", "anywhere")
 _OF_CONE = ("chord", "flat", "room", "solid_angle", "clear", "layout", "of_cones", "drop")
-_NUMBERS = ("kind", "most", "moved", "alone", "part_across", "part_along", "u_0", "u_1", "u_2", *_OF_CONE)
+_OF_PART = ("kind", "most", "moved", "alone", "part_across", "part_along")
+_NUMBERS = (*_OF_PART, "u_0", "u_1", "u_2", *_OF_CONE)
 
 
 def _inputs(parts):
@@ -126,16 +129,16 @@ def _part_group(parts):
     return make_group(title, content, inputs, [["BSDF", "SHADER"]], fill)
 
 
-def _lamp_group(parts):
-    """The group that makes a lamp's closures, one for each of its parts. Cycles skips the
-    computations of closures whose factor is 0."""
+def _lamp_group(parts, cones):
+    """The group that makes a lamp's closures, one for each of its parts, of which there may be
+    `cones`. Cycles skips the computations of closures whose factor is 0."""
     part, inputs = _part_group(parts), _inputs(parts) + [["lit", "FLOAT"]]
 
     def fill(w, found):
         closures = []
         is_grid = w.math("GREATER_THAN", found["layout"], _GRID / 2)
         count = w.mix(is_grid, w.math("ABSOLUTE", found["layout"]), 4.0)
-        for i, place in enumerate(_PARTS):
+        for i, place in enumerate(_PARTS[:cones]):
             closure = add_group(w, part, found | place, f"part {i}")["BSDF"]
             if i > 0:
                 # The first factor is a constant, with which Cycles removes what a lamp never has.
@@ -145,7 +148,7 @@ def _lamp_group(parts):
             closures.append(closure)
         return {"BSDF": w.shown(found["lit"], w.sum(closures))}
 
-    content = ["lamp", len(_PARTS), _GRID, part[PART]]
+    content = ["lamp", cones, _GRID, part[PART]]
     return make_group(f"{parts.title}: lamp", content, inputs, [["BSDF", "SHADER"]], fill)
 
 
@@ -288,11 +291,11 @@ def _move_aside(w, parts, lamp, at, later):
     return aside
 
 
-def seen(w, parts, of_slots, here, widest):
+def seen(w, parts, of_slots, cones, here, widest):
     """How the lamps look from the shading point, and which of them get closures: a dictionary of
-    outputs for each. `of_slots`: the outputs of each slot, in the order of SLOT. `here`: the
-    shading point."""
-    group, lamps = _seen_group(parts), []
+    outputs for each. `of_slots`: the outputs of each slot, in the order of SLOT. `cones`: how many
+    each lamp may have. `here`: the shading point."""
+    group, lamps = _seen_group(parts, cones), []
     for slot in of_slots:
         values = dict(zip(SLOT, slot, strict=True))
         lamps.append(values | add_group(w, group, here | values, "lamp seen"))
@@ -300,9 +303,10 @@ def seen(w, parts, of_slots, here, widest):
     return lamps
 
 
-def closures(w, parts, lamps, given):
-    """The closures of the lamps that seen() returned. `given`: what the model's formula needs."""
+def closures(w, parts, lamps, cones, given):
+    """The closures of the lamps that seen() returned for this number of cones. `given`: what the
+    model's formula needs."""
     if not lamps:
         return []
-    group = _lamp_group(parts)
+    group = _lamp_group(parts, cones)
     return [add_group(w, group, given | lamp, "lamp")["BSDF"] for lamp in lamps]

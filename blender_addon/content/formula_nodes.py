@@ -124,13 +124,13 @@ def _direction(w, u, v):
     return w.combine(x, y, height)
 
 
-def wire(tree, data, normal, tangent, parameters, outputs_of_slots, title):
+def wire(tree, data, normal, tangent, parameters, outputs_of_slots, cones, title):
     """Adds a model's nodes as a group. Returns the outputs by name: the BSDF, and the Albedo where
     the model consists of Blender's own closures only.
 
     `data`: contents of nodes/*.json. `normal` and `tangent`: outputs that are 0 where the surface's
     own are meant. `parameters`: outputs or numbers by name. `outputs_of_slots`: four for each lamp.
-    `title`: prefix of the names of the new groups.
+    `cones`: how many each lamp may have. `title`: prefix of the names of the new groups.
     """
     kinds = {name: kind for part in data["parts"].values() for name, kind in part["inputs"]}
     kinds |= dict.fromkeys(data["bounds"], "FLOAT")
@@ -146,18 +146,20 @@ def wire(tree, data, normal, tangent, parameters, outputs_of_slots, title):
     def fill(w, found):
         of_slots = [[found[name] for name in names] for names in placed]
         given = {name: found[socket] for name, socket in own.items()}
-        return _wired(w, data, found["Normal"], found["Tangent"], given, of_slots, title)
+        return _wired(w, data, found["Normal"], found["Tangent"], given, of_slots, cones, title)
 
     inputs = [[name, kind] for name, (_, kind) in values.items()]
     outputs = [["BSDF", "SHADER"], *([] if "draw" in data["parts"] else [["Albedo", "VECTOR"]])]
-    group = make_group(f"{title}: formulas", [data, inputs], inputs, outputs, fill, kept=True)
+    group = make_group(
+        f"{title}: formulas", [data, inputs, cones], inputs, outputs, fill, kept=True
+    )
     w = Wiring(tree)
     made = add_group(w, group, {name: value for name, (value, _) in values.items()}, "Formulas")
     w.place_nodes()
     return made
 
 
-def _wired(w, data, normal, tangent, parameters, of_slots, title):
+def _wired(w, data, normal, tangent, parameters, of_slots, cones, title):
     """Adds the nodes of a model; returns outputs by name, see wire()."""
     geometry = w.node("ShaderNodeNewGeometry")
     constants = svm_constants.add_values(w, geometry.outputs["Backfacing"])
@@ -207,9 +209,9 @@ def _wired(w, data, normal, tangent, parameters, of_slots, title):
         here = {"at": surface.place, "view": surface.view, "true": surface.true_normal}
         here |= dict(frame)
         given |= here | constants
-        lamps = formula_lamps.seen(w, parts, of_slots, here, data["widest"])
+        lamps = formula_lamps.seen(w, parts, of_slots, cones, here, data["widest"])
     shaders.append(_rest(w, parts, surface, given, lamps, data["narrow"]))
-    shaders += formula_lamps.closures(w, parts, lamps, given)
+    shaders += formula_lamps.closures(w, parts, lamps, cones, given)
     return {"BSDF": w.sum(shaders)}
 
 

@@ -36,15 +36,15 @@ def expected_inputs(form):
     return inputs
 
 
-def _lamp_inputs(form, slots=None):
-    """A form's inputs that the shared group of lamps feeds, or those of its first `slots`; a form
-    may have fewer slots than the group."""
+def _lamp_inputs(form, room=lamps.WHOLE):
+    """A form's inputs that the shared group of lamps feeds, as far as there is room; a form may
+    have fewer slots than the group."""
     if form.lamps > lamps.SLOTS:
         raise pack.PackError(
             f"manifest.json: {form.model.name} ({form.name}): expected at most {lamps.SLOTS} "
             f"lamps, got {form.lamps}"
         )
-    return lamps.part_names(form.lamps if slots is None else slots)
+    return lamps.part_names(min(form.lamps, room.lamps))
 
 
 def scripts(group):
@@ -124,10 +124,10 @@ def bent_normal_group(model_name):
     return formula_nodes.bent_normal_group(json.loads(source))
 
 
-def fill_with_nodes(group, form, source, twin_group, slots=None):
+def fill_with_nodes(group, form, source, twin_group, room=lamps.WHOLE):
     """Fills a group with a form of Blender's own nodes. Its sockets are those of the other forms;
     but a twin has no use for a tangent. `twin_group`: the group of the model's twin, or None.
-    `slots`: the number of lamps, if less than the form's."""
+    `room`: for lamps."""
     data = json.loads(source)
     label, is_twin = form.model.label, form.name == "twin"
     # Outputs come first, so that a twin's sockets keep the identifiers that existing files have.
@@ -143,7 +143,7 @@ def fill_with_nodes(group, form, source, twin_group, slots=None):
         )
     else:
         of_slots = []
-        if names := _lamp_inputs(form, slots):
+        if names := _lamp_inputs(form, room):
             shared = _add_lamps(group)
             of_slots = lamps.by_slot([shared.outputs[name] for name in names])
         made = formula_nodes.wire(
@@ -153,6 +153,7 @@ def fill_with_nodes(group, form, source, twin_group, slots=None):
             tangent,
             parameters | formula_nodes.numbers(form.constants),
             of_slots,
+            room.cones,
             label,
         )
         instead = None

@@ -12,6 +12,8 @@ recorded may therefore point to data that undo frees. So groups filled by a hand
 before undo and redo, and filled again afterwards.
 """
 
+import functools
+
 from bpy.app.handlers import persistent
 
 from .. import lamps
@@ -39,9 +41,9 @@ def follow(scene=None):
         return
     _busy = True
     try:
-        lacks_osl = device.lacks_osl(scene)
+        lacks_osl, room_needed = device.lacks_osl(scene), functools.cache(lamps.room_needed)
         for group in groups:
-            if nodes.adapt_to_scene(group, lacks_osl):
+            if nodes.adapt_to_scene(group, lacks_osl, room_needed):
                 _filled.add(group.session_uid)
     finally:
         _busy = False

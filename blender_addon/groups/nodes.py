@@ -20,8 +20,8 @@ from ..trees import animation
 from . import model_nodes
 from .model_nodes import AUTO, TAG
 
-#: Entry of a group's tag: how many lamps its nodes have room for, if fewer than the form's.
-SLOTS = "slots"
+#: Entry of a group's tag: the lamps.Room of its nodes, if less than the form's.
+ROOM = "room"
 
 
 def empty_tree(owner):
@@ -38,10 +38,14 @@ def source_text(group):
     return script.script.as_string() if script is not None and script.script else ""
 
 
-def find_group(form, albedo=False, with_osl=None, slots=None):
+def _room_of(tag):
+    return lamps.Room(*tag[ROOM]) if ROOM in tag else lamps.WHOLE
+
+
+def find_group(form, albedo=False, with_osl=None, room=lamps.WHOLE):
     """The group of the current version of a form, if the file has an intact one; `albedo` as in
     ensure_group. `with_osl`: the form to take where OSL runs, of a group that adapts to the
-    scene. `slots`: the number of lamps of a group inside of that, if less than the form's."""
+    scene. `room`: that of a group inside of that."""
     albedo = albedo and (with_osl or form).has_albedo_script
     automatic = with_osl and with_osl.name
     for group in bpy.data.node_groups:
@@ -49,7 +53,7 @@ def find_group(form, albedo=False, with_osl=None, slots=None):
         if group.library is None and tag is not None and tag.get("digest") == form.digest:
             same = (tag["model"], tag["representation"]) == (form.model.name, form.name)
             has_albedo = tag["with_albedo"] if AUTO in tag else "albedo_inputs" in tag
-            same = same and (automatic or tag.get(SLOTS) == slots)
+            same = same and (automatic or _room_of(tag) == room)
             if same and tag.get(AUTO) == automatic and has_albedo == albedo and is_sound(group):
                 return group
     return None
@@ -87,7 +91,7 @@ def _replace_by_local_equal(group):
     def description(group):
         tag = group[TAG].to_dict()
         # An automatic group gets room for the scene's lamps.
-        return {k: v for k, v in tag.items() if k != SLOTS or AUTO not in tag}
+        return {k: v for k, v in tag.items() if k != ROOM or AUTO not in tag}
 
     wanted = description(group)
     for other in bpy.data.node_groups:
@@ -136,16 +140,17 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False, va
 def _ensure_automatic(with_osl, albedo):
     """The group that adapts to the scene; `with_osl`: its form where OSL runs."""
     native = with_osl.model.native_form
+    lacks_osl = device.lacks_osl(lamps.current_scene())
     for form in (with_osl, native):
         if group := find_group(form, albedo, with_osl):
             _clear_fake_users(group)
-            adapt_to_scene(group, device.lacks_osl(lamps.current_scene()))
+            adapt_to_scene(group, lacks_osl)
             return group
     with _new_group("auto", with_osl, albedo) as group:
         tag = group[TAG]
         tag[AUTO], tag["with_albedo"] = with_osl.name, albedo and with_osl.has_albedo_script
         tag["native_only"] = json.dumps(native.only)
-        _change_form(group, native if device.lacks_osl(lamps.current_scene()) else with_osl)
+        _change_form(group, native if lacks_osl else with_osl, lamps.room_needed)
     return group
 
 
@@ -191,23 +196,20 @@ def _new_group(name, form, albedo):
         _unfinished.pop()
 
 
-def _group_of(form, slots=None):
-    """The group of a form of Blender's own nodes inside another group; `slots` as in
+def _group_of(form, room=lamps.WHOLE):
+    """The group of a form of Blender's own nodes inside another group; `room` as in
     find_group()."""
-    if group := find_group(form, slots=slots):
+    if group := find_group(form, room=room):
         return group
     with _new_group(form.name, form, False) as group:
-        if slots is not None:
-            group[TAG][SLOTS] = slots
+        _set_room(group, room)
         _fill(group, form, False)
     return group
 
 
-def _slots_needed(form):
-    """The number of lamps that a form of Blender's own nodes gets for the scene; None for all that
-    it can have."""
-    needed = lamps.slots_needed() if form.lamps else 0
-    return needed if needed < form.lamps else None
+def _set_room(group, room):
+    if room != lamps.WHOLE:
+        group[TAG][ROOM] = [*room]
 
 
 def _fill(group, form, albedo):
@@ -221,8 +223,7 @@ def _fill(group, form, albedo):
     stands_in = twin is not None and twin != form and "baked" not in group[TAG]
     twin_group = _group_of(twin) if stands_in else None
     if form.is_native:
-        slots = group[TAG].get(SLOTS)
-        group_content.fill_with_nodes(group, form, source, twin_group, slots)
+        group_content.fill_with_nodes(group, form, source, twin_group, _room_of(group[TAG]))
         return
     before = list(group.nodes)
     texts = [stand_in.new_text(f"{stem}.osl", source) for stem, source in sources.items()]
@@ -246,7 +247,7 @@ def automatic_groups():
     return [g for g in bpy.data.node_groups if g.library is None and AUTO in g.get(TAG, ())]
 
 
-def adapt_to_scene(group, lacks_osl):
+def adapt_to_scene(group, lacks_osl, room_needed=lamps.room_needed):
     """Changes an automatic group to the form that a scene with or without OSL can render, with room
     for the scene's lamps, if the installed version made the group; sockets stay. Returns whether
     the group has changed. If it raises CompileError, the group is as it was.
@@ -254,21 +255,23 @@ def adapt_to_scene(group, lacks_osl):
     A group that has room for more lamps keeps it: lamps are often hidden and shown again.
     """
     tag = group[TAG]
-    has_room = not lacks_osl or tag.get(SLOTS) is None or tag[SLOTS] >= lamps.slots_needed()
     # Handlers call this at each change of the scene, and computing the version takes a hash.
-    if group.nodes and (tag["representation"] == tag[AUTO]) != lacks_osl and has_room:
-        return False
+    if group.nodes and (tag["representation"] == tag[AUTO]) != lacks_osl:
+        if not lacks_osl or ROOM not in tag:
+            return False
+        if room_needed().joined(_room_of(tag)) == _room_of(tag):
+            return False
     if not model_nodes.is_current(group):
         return False
     model = pack.model(tag["model"])
     wanted = model.native_form if lacks_osl else model.forms[tag[AUTO]]
     if wanted is None:
         return False
-    _change_form(group, wanted)
+    _change_form(group, wanted, room_needed)
     return True
 
 
-def _change_form(group, form):
+def _change_form(group, form, room_needed):
     tag, before = group[TAG].to_dict(), list(group.nodes)
     # Blender brings a dragged asset again if what it brought before is gone.
     inner = {
@@ -279,16 +282,17 @@ def _change_form(group, form):
     texts = {n.script for n in before if n.bl_idname == "ShaderNodeScript" and n.script}
     with_osl = form.model.forms[tag[AUTO]]
     try:
-        group[TAG].pop(SLOTS, None)
+        group[TAG].pop(ROOM, None)
         if form == with_osl:
             _fill(group, form, tag["with_albedo"])
         else:
-            slots = _slots_needed(form)
-            if slots is not None:
-                group[TAG][SLOTS] = slots
+            room = room_needed() if form.lamps else lamps.WHOLE
+            if ROOM in tag:
+                room = room.joined(lamps.Room(*tag[ROOM]))
+            _set_room(group, room)
 
             def group_of(inner):
-                return _group_of(inner, slots if inner == form else None)
+                return _group_of(inner, room if inner == form else lamps.WHOLE)
 
             group_content.fill_with_form(group, form, with_osl, group_of)
     except BaseException:

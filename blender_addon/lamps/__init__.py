@@ -15,7 +15,7 @@ from .filling import (
     follow,
     last_found,
     refresh,
-    slots_needed,
+    room_needed,
 )
 from .handlers import register, unregister
 from .kinds import of_light as kind_of
@@ -25,12 +25,14 @@ from .shared_group import find as find_group
 from .shared_group import is_shared as is_group
 from .shared_group import remove_unused as remove_unused_group
 from .sizes import enlarge, sizeless
-from .slots import NO_NEED, SLOTS, Lamp, by_slot, elsewhere, part_names, too_many
+from .slots import NO_NEED, SLOTS, WHOLE, Lamp, Room, by_slot, elsewhere, part_names, too_many
 
 __all__ = [
     "NO_NEED",
     "SLOTS",
+    "WHOLE",
     "Lamp",
+    "Room",
     "ask",
     "by_slot",
     "count",
@@ -49,8 +51,8 @@ __all__ = [
     "refresh",
     "register",
     "remove_unused_group",
+    "room_needed",
     "sizeless",
-    "slots_needed",
     "too_many",
     "unregister",
 ]

@@ -200,9 +200,9 @@ def ensure_group():
     return group
 
 
-def slots_needed():
-    """The number of slots that nodes need for the lamps of the shared group."""
-    return slots.enough(shared_group.used(ensure_group()))
+def room_needed():
+    """The slots.Room that nodes need for the lamps of the shared group."""
+    return shared_group.room(ensure_group())
 
 
 def quietly(scene, depsgraph=None, **options):

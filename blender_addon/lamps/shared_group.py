@@ -74,30 +74,37 @@ def sockets(group):
     found = []
     for name in slots.part_names(slots.SLOTS):
         for index, socket in enumerate(group.nodes[name].inputs):
-            found.append((socket, f'nodes["{name}"].inputs[{index}].default_value'))
+            found.append((socket, _path(name, index)))
     return found
 
 
-def used(group):
-    """How many slots have a lamp; these are the first ones."""
-    driven = set()
-    if group.animation_data is not None:
-        driven = {curve.data_path for curve in group.animation_data.drivers}
-    for count in range(slots.SLOTS, 0, -1):
-        name = f"{slots.PARTS[-1]}{count}"
-        path = f'nodes["{name}"].inputs[0].default_value'
-        if path in driven or group.nodes[name].inputs[0].default_value != slots.EMPTY:
-            return count
-    return 0
+def _path(name, index):
+    return f'nodes["{name}"].inputs[{index}].default_value'
+
+
+def _curves(group):
+    """Drivers by data path."""
+    if group.animation_data is None:
+        return {}
+    return {curve.data_path: curve for curve in group.animation_data.drivers}
+
+
+def room(group):
+    """The slots.Room that its lamps need, which have the first slots."""
+    curves, shapes, count = _curves(group), [], 0
+    for slot in range(1, slots.SLOTS + 1):
+        name = f"{slots.PARTS[-1]}{slot}"
+        curve = curves.get(_path(name, 0))
+        shapes.append(_read(curve) if curve else group.nodes[name].inputs[0].default_value)
+        if shapes[-1] != slots.EMPTY:
+            count = slot
+    return slots.room_for(shapes[:count])
 
 
 def written(group):
     """The current numbers of the group: floats and slots.Driven; None for a driver that the
     extension did not make."""
-    curves = {}
-    if group.animation_data is not None:
-        curves = {curve.data_path: curve for curve in group.animation_data.drivers}
-    values = []
+    curves, values = _curves(group), []
     for socket, path in sockets(group):
         curve = curves.get(path)
         values.append(socket.default_value if curve is None else _read(curve))

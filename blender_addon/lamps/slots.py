@@ -3,6 +3,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -23,7 +24,7 @@ EMPTY, BALL, SUN, RECTANGLE, ELLIPSE, SKY_SUN = range(6)
 #: others in that plane. Formula Nodes read both (content/formula_lamps.py), other shaders skip
 #: them.
 CODE = 8.0
-#: Most cones of a rectangle. Formula Nodes have a closure for each.
+#: Most cones of a rectangle. Formula Nodes have a closure for each, and compute the model for it.
 MOST_CONES = 4
 #: Index of that number in a slot.
 _SHAPE = 9
@@ -34,10 +35,27 @@ def part_names(count):
     return [f"{part}{slot}" for slot in range(1, count + 1) for part in PARTS]
 
 
-def enough(count):
-    """The number of slots that nodes get for so many lamps: few numbers, so that nodes are seldom
-    made again."""
-    return next(size for size in _ENOUGH if size >= min(count, SLOTS))
+class Room(NamedTuple):
+    """What the nodes of a material have room for."""
+
+    lamps: int
+    cones: int  # of each lamp
+
+    def joined(self, other):
+        """Room for what either has room for."""
+        return Room(*map(max, self, other))
+
+
+#: Room for all lamps that the shared group can have.
+WHOLE = Room(SLOTS, MOST_CONES)
+
+
+def room_for(shapes):
+    """The room that nodes get for lamps with these shapes in their slots, of which None is unknown.
+    There are few sizes, so that nodes are seldom made again."""
+    cones = [MOST_CONES if shape is None else _code_of(shape) % int(CODE) + 1 for shape in shapes]
+    lamps = next(size for size in _ENOUGH if size >= len(shapes))
+    return Room(lamps, MOST_CONES if any(count > 1 for count in cones) else 1)
 
 
 def by_slot(parts):
@@ -175,20 +193,19 @@ def coded(values, cones, plane):
     return (*values[:_SHAPE], shape, *values[_SHAPE + 1 :])
 
 
-def _code_of(values):
-    shape = values[_SHAPE]
+def _code_of(shape):
     number = shape.added if isinstance(shape, Driven) else shape
     return 0 if number is None else math.floor(number / CODE)
 
 
 def plane_of(values):
     """The number of the plane that coded() was given."""
-    return _code_of(values) // int(CODE)
+    return _code_of(values[_SHAPE]) // int(CODE)
 
 
 def decoded(values):
     """coded() undone."""
-    code = _code_of(values)
+    code = _code_of(values[_SHAPE])
     return coded(values, 1 - code, 0) if code else values
 
 

@@ -374,7 +374,8 @@ def add_lamp(scene, x, size=0.0):
 
 
 def room_of(extension, material):
-    """For how many lamps a material's nodes have room, as its tag and as its nodes tell."""
+    """For how many lamps, with how many cones each, a material's nodes have room, as its tag and as
+    its nodes tell."""
     (node,) = extension.model_nodes.group_nodes(material)
     tag = node.node_tree[extension.model_nodes.TAG]
     (inner,) = [
@@ -383,11 +384,19 @@ def room_of(extension, material):
         if extension.model_nodes.is_ours(n)
         and n.node_tree[extension.model_nodes.TAG]["representation"] == "nodes"
     ]
-    groups = [n for n in inner.nodes if n.bl_idname == "ShaderNodeGroup"]
-    shared = next(n for n in groups if n.node_tree.name == "brdfc Lamps")
+
+    def inside(tree, name):
+        groups = [n for n in tree.nodes if n.bl_idname == "ShaderNodeGroup"]
+        return [n for n in groups if name in n.node_tree.name]
+
+    (shared,) = inside(inner, "brdfc Lamps")
     slots = sum(o.is_linked for o in shared.outputs) // 4
-    assert tag.get("slots", 8) == slots
-    return slots
+    (formulas,) = inside(inner, "formulas")
+    lamps = inside(formulas.node_tree, ": lamp")
+    cones = len(inside(lamps[0].node_tree, "part of lamp"))
+    assert len(lamps) == slots
+    assert tuple(tag.get("room", (8, 4))) == (slots, cones)
+    return slots, cones
 
 
 def test_nodes_have_room_for_the_lamps_of_the_scene(extension, new_file):
@@ -403,10 +412,10 @@ def test_nodes_have_room_for_the_lamps_of_the_scene(extension, new_file):
         last = add_lamp(new_file, x)
         pictures.append(render(new_file))
         rooms.append(room_of(extension, material))
-    assert rooms == [2, 2, 4, 4, 8]
+    assert rooms == [(2, 1), (2, 1), (4, 1), (4, 1), (8, 1)]
     last.hide_render = True
     hidden = render(new_file)
-    assert room_of(extension, material) == 8
+    assert room_of(extension, material) == (8, 1)
     np.testing.assert_allclose(hidden, pictures[3], rtol=1e-5, atol=1e-6)
     extension.api.switch_representation(material, "nodes")
     last.hide_render = False
@@ -414,6 +423,27 @@ def test_nodes_have_room_for_the_lamps_of_the_scene(extension, new_file):
         np.testing.assert_allclose(render(new_file), picture, rtol=1e-5, atol=1e-6)
         if others := [o for o in new_file.objects if o.name.startswith("Another")]:
             bpy.data.objects.remove(others[-1])
+
+
+def test_room_for_the_cones_of_an_area_lamp(extension, new_file):
+    """Nodes compute the model four times for each lamp only where a lamp is a rectangle; and what
+    was needed once stays."""
+    few_samples(new_file, 16, 24)
+    add_camera(new_file)
+    material = extension.api.new_material("cook_torrance")
+    add_sphere(new_file, material)
+    update(new_file)
+    assert room_of(extension, material) == (2, 1)
+    (lamp,) = [o for o in new_file.objects if o.type == "LIGHT"]
+    lamp.data.type = "AREA"
+    lamp.data.shape, lamp.data.size = "SQUARE", 2.0
+    render(new_file)
+    assert room_of(extension, material) == (2, 4)
+    lamp.data.shape = "DISK"
+    for x in (-3.0, 2.0):
+        add_lamp(new_file, x)
+    render(new_file)
+    assert room_of(extension, material) == (4, 4)
 
 
 def test_room_for_a_lamp_that_is_shown_later(extension, new_file):
@@ -437,9 +467,9 @@ def test_room_for_a_lamp_that_is_shown_later(extension, new_file):
         item.keyframe_insert("hide_render", frame=frame)
     new_file.frame_set(1)
     before = render(new_file)
-    assert room_of(extension, material) == 2
+    assert room_of(extension, material) == (2, 1)
     new_file.frame_set(2)
-    assert room_of(extension, material) == 4
+    assert room_of(extension, material) == (4, 4)  # the mesh is a square
     assert render(new_file).mean() > 1.05 * before.mean()
 
 
@@ -459,7 +489,7 @@ def test_undo_of_a_lamp(extension, new_file):
     for step, expected in ((bpy.ops.ed.undo, 1), (bpy.ops.ed.undo, 0), (bpy.ops.ed.redo, 1)):
         assert step() == {"FINISHED"}
         np.testing.assert_allclose(render(bpy.context.scene), pictures[expected], rtol=1e-5)
-        assert room_of(extension, bpy.data.materials[name]) == (2, 2, 4)[expected]
+        assert room_of(extension, bpy.data.materials[name]) == ((2, 2, 4)[expected], 1)
 
 
 def test_a_saved_file_renders_without_the_extension(extension, new_file, tmp_path):
