@@ -27,7 +27,7 @@ def _refuse_beside_another():
 def register():
     _refuse_beside_another()
     i18n.register()
-    lamps.ask(closure_slots.lamps_that_fit, lambda: not update.others())
+    lamps.ask(closure_slots.budget_of_file, lambda: not update.others())
     operators.register()
     ui.register()
     plot_panel.register()

@@ -13,7 +13,6 @@ _SEEN = [
     ["part_along", "FLOAT"],
     ["drop", "FLOAT"],
     ["of_cones", "FLOAT"],
-    ["solid_angle", "FLOAT"],
     ["chord", "FLOAT"],
     ["reach", "FLOAT"],
     ["inner", "FLOAT"],
@@ -24,7 +23,6 @@ _SEEN = [
     ["aim", "VECTOR"],
     ["layout", "FLOAT"],
     ["moved", "FLOAT"],
-    ["alone", "FLOAT"],
     ["clear", "FLOAT"],
 ]
 #: Vectors of a slot, and what its shape's first number consists of.
@@ -91,9 +89,10 @@ def _point_of(w, towards, drop, anywhere, u):
 
 #: Inputs of the groups below, besides those of the model's formula.
 _VECTORS = (*SLOT, "towards", "aim", "at", "view", "tangent", "bitangent", "normal", "anywhere")
-_OF_CONE = ("chord", "flat", "room", "solid_angle", "clear", "layout", "of_cones", "drop")
-_OF_PART = ("kind", "most", "moved", "alone", "part_across", "part_along")
-_NUMBERS = (*_OF_PART, "u_0", "u_1", "u_2", *_OF_CONE)
+_NUMBERS = (
+    *("kind", "most", "layout", "moved", "part_across", "part_along", "of_cones", "drop"),
+    *("chord", "flat", "clear", "room", "u_0", "u_1", "u_2"),
+)
 
 
 def _inputs(parts):
@@ -117,10 +116,9 @@ def _part_group(parts):
         point = w.mix(found["flat"], point, on_flat["wi"], True)
         frame = (found["tangent"], found["bitangent"], found["normal"])
         at_point = here.add("value", **(found | {"wi": w.local(point, frame)}))
-        cone = {name: found[name] for name in _OF_CONE}
-        cone |= {"emphasis": on_flat["emphasis"], "u_2": found["u_2"]}
         placed = here.add("cone_at", **found)
-        lobe = here.add("lobe", **at_point, **cone | {"chord": placed["chord"]})
+        known = found | at_point | placed | {"emphasis": on_flat["emphasis"]}
+        lobe = here.add("lobe", **known)
         return {"BSDF": w.toon(lobe["color"], lobe["size"], w.half(placed["axis"], found["view"]))}
 
     used = ("value", "flat", "cone_at", "lobe")
@@ -198,7 +196,7 @@ def _later_group():
 
 #: What changes where a lamp has a cone beside another lamp. Only so many lamps can have that, from
 #: the widest, since SVM keeps the numbers of all lamps at a time.
-_MOVED = ("layout", "clear", "chord", "aim")
+_MOVED = ("layout", "clear", "of_cones", "aim")
 _MOST_ASIDE = 4
 #: What _keep_apart() needs to know of a lamp besides the inputs of the part "aside".
 _BOUNDS = ("towards", "reach", "flat", "used", "active", "above", "plane", *_MOVED)
@@ -285,7 +283,7 @@ def _move_aside(w, parts, lamp, at, later):
     aside = w.math("MULTIPLY", lamp["flat"], has_later)
     for condition in (overlaps, alone, made["fits"]):
         aside = w.math("MULTIPLY", aside, condition)
-    new = {"layout": 1.0, "clear": made["clear"], "chord": made["chord"]}
+    new = {"layout": 1.0, "clear": made["clear"], "of_cones": made["of_cones"]}
     lamp |= {name: w.mix(aside, lamp[name], value) for name, value in new.items()}
     lamp["aim"] = w.mix(aside, lamp["aim"], made["axis"], True)
     return aside

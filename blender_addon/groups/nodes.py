@@ -287,7 +287,7 @@ def _change_form(group, form, room_needed):
             _fill(group, form, tag["with_albedo"])
         else:
             room = room_needed() if form.lamps else lamps.WHOLE
-            if ROOM in tag:
+            if before and ROOM in tag:
                 room = room.joined(lamps.Room(*tag[ROOM]))
             _set_room(group, room)
 

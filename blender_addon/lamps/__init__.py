@@ -25,12 +25,24 @@ from .shared_group import find as find_group
 from .shared_group import is_shared as is_group
 from .shared_group import remove_unused as remove_unused_group
 from .sizes import enlarge, sizeless
-from .slots import NO_NEED, SLOTS, WHOLE, Lamp, Room, by_slot, elsewhere, part_names, too_many
+from .slots import (
+    NO_NEED,
+    SLOTS,
+    WHOLE,
+    Budget,
+    Lamp,
+    Room,
+    by_slot,
+    elsewhere,
+    part_names,
+    too_many,
+)
 
 __all__ = [
     "NO_NEED",
     "SLOTS",
     "WHOLE",
+    "Budget",
     "Lamp",
     "Room",
     "ask",

@@ -36,48 +36,30 @@ def _arranged(chosen, before):
 
 
 def _no_limit():
-    return None
+    return slots.Budget(slots.SLOTS * slots.MOST_CONES)
 
 
 def _always():
     return True
 
 
-_room, _are_codes_read = _no_limit, _always
+budget_of_file, _are_codes_read = _no_limit, _always
 
 
-def ask(lamps_that_fit, are_codes_read):
-    """Sets two functions that look into groups, which are made of this package. lamps_that_fit()
-    counts how many lamps the open file's materials can aim at: it returns a tuple that begins with
-    the number, or None. are_codes_read(): whether all materials of the open file read
-    slots.coded(), which those of older versions don't."""
-    global _room, _are_codes_read
-    _room, _are_codes_read = lamps_that_fit, are_codes_read
+def ask(budget, are_codes_read):
+    """Sets two functions that look into groups, which are made of this package. budget(): the
+    slots.Budget of the open file's materials. are_codes_read(): whether all materials of the open
+    file read slots.coded(), which those of older versions don't."""
+    global budget_of_file, _are_codes_read
+    budget_of_file, _are_codes_read = budget, are_codes_read
 
 
-def _most():
-    """How many lamps there is room for in the open file's materials."""
-    found = _room()
-    return slots.SLOTS * slots.MOST_CONES if found is None else found[0]
-
-
-def most_lamps():
-    """How many lamps materials can aim at."""
-    return min(_most(), slots.SLOTS)
-
-
-def _cones(chosen, most):
-    """The number of cones that each chosen lamp may have. All of them have a closure, of which
-    there is room for `most`; bright lamps get more."""
-    counts = [1] * len(chosen)
-    wanted = [c.sheet.cones() if c.sheet is not None else 1 for c in chosen]
-
-    def worth(i):
-        return chosen[i].rank / counts[i] if counts[i] < wanted[i] else 0.0
-
-    while chosen and sum(counts) < most and worth(i := max(range(len(chosen)), key=worth)) > 0:
-        counts[i] += 1
-    return counts
+def _cones(chosen, budget):
+    """The number of cones that each chosen lamp may have; bright lamps get theirs first."""
+    order = sorted(range(len(chosen)), key=lambda i: -chosen[i].rank)
+    sheets = [chosen[i].sheet for i in order]
+    counts = budget.cones([1 if sheet is None else sheet.cones() for sheet in sheets])
+    return [count for _, count in sorted(zip(order, counts, strict=True))]
 
 
 def _planes(chosen):
@@ -100,9 +82,9 @@ def _planes(chosen):
     return planes
 
 
-def _numbers(chosen, most):
+def _numbers(chosen, budget):
     """The numbers of the slots of the chosen lamps."""
-    cones, planes = _cones(chosen, most), _planes(chosen)
+    cones, planes = _cones(chosen, budget), _planes(chosen)
     if (max(cones, default=1) > 1 or any(planes)) and not _are_codes_read():
         return [c.values for c in chosen]
     found = zip(chosen, cones, planes, strict=True)
@@ -129,7 +111,7 @@ def _listed(survey, chosen, why=None):
 
 #: Result of the last survey and the session_uid of its scene; busy: whether the group is being
 #: filled.
-memory = SimpleNamespace(scene=None, survey=Survey(), lamps=[], limit=slots.SLOTS, busy=False)
+memory = SimpleNamespace(scene=None, survey=Survey(), lamps=[], budget=None, busy=False)
 
 
 def _survey(scene, depsgraph, subject=None):
@@ -149,15 +131,16 @@ def _fill(scene, depsgraph, subject=None, keep=True):
     """Updates the shared group, if there is one; returns [slots.Lamp]. `keep`: lamps keep their
     slots where possible."""
     survey = _survey(scene, depsgraph, subject)
-    most = _most()
-    limit = min(most, slots.SLOTS)
+    budget = budget_of_file()
     group = shared_group.deduplicate()
     now = shared_group.written(group) if group else []
-    chosen = _arranged(_worth_aiming(survey)[:limit], _by_slot(now) if group and keep else [])
+    chosen = _arranged(
+        _worth_aiming(survey)[: budget.lamps()], _by_slot(now) if group and keep else []
+    )
     if group:
         sockets = shared_group.sockets(group)
         empty = (0.0,) * _SIZE
-        filled = _numbers(chosen, most)
+        filled = _numbers(chosen, budget)
         wanted = [v for numbers in filled for v in numbers]
         wanted += [*empty] * (slots.SLOTS - len(chosen))
         survey.beside = {c.name for c, n in zip(chosen, filled, strict=True) if slots.plane_of(n)}
@@ -167,7 +150,7 @@ def _fill(scene, depsgraph, subject=None, keep=True):
                 shared_group.write(socket, new)
     lamps = _listed(survey, chosen)
     memory.scene, memory.survey = scene.session_uid, survey
-    memory.lamps, memory.limit = lamps, limit
+    memory.lamps, memory.budget = lamps, budget
     return lamps
 
 
@@ -239,7 +222,7 @@ def last_found(scene, group=None):
     survey = memory.survey if surveyed else _survey(scene, scene.view_layers[0].depsgraph)
     worth = _worth_aiming(survey)
     if group is None:
-        return _listed(survey, _arranged(worth[: most_lamps()], []))
+        return _listed(survey, _arranged(worth[: budget_of_file().lamps()], []))
     there = [slots.decoded(numbers) for numbers in _by_slot(shared_group.written(group))]
     chosen = [c for c in worth if any(shared_group.all_same(c.values, slot) for slot in there)]
     return _listed(survey, chosen, slots.elsewhere(group.library))

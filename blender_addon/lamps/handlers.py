@@ -15,7 +15,10 @@ def _concerns(update, scene):
     """Whether an update of the dependency graph may change the contents of the slots."""
     item, survey = update.id, filling.memory.survey
     if isinstance(item, bpy.types.Object):
-        kind, crowded = kinds.of_object(item), len(survey.candidates) > filling.memory.limit
+        kind, crowded = (
+            kinds.of_object(item),
+            len(survey.candidates) > filling.memory.budget.lamps(),
+        )
         if kind is not None and kind.is_changed(update, survey, crowded):
             return True
         if item.original.name_full in survey.instancers:
@@ -37,12 +40,12 @@ def _concerns(update, scene):
 
 
 def _is_limited_anew(updates):
-    """Whether the number of lamps that materials can aim at may have changed. Counting takes time,
+    """Whether there may be room for more or fewer lamps beside the materials. Counting takes time,
     so this looks only at changes of a material or a setting."""
     types = bpy.types.Scene | bpy.types.Material | bpy.types.NodeTree
     if not any(isinstance(u.id, types) for u in updates):
         return False
-    return filling.most_lamps() != filling.memory.limit
+    return filling.budget_of_file() != filling.memory.budget
 
 
 @persistent

@@ -35,6 +35,32 @@ def part_names(count):
     return [f"{part}{slot}" for slot in range(1, count + 1) for part in PARTS]
 
 
+class Budget(NamedTuple):
+    """What shaders leave for lamps at a shading point: closures, and numbers that Cycles keeps at a
+    time without Open Shading Language. Each cone of a lamp takes a closure."""
+
+    closures: int
+    numbers: float = math.inf
+
+    #: Numbers that a lamp takes, and those that its cones add if it has several.
+    LAMP, CONES = 12.6, 8.0
+
+    def lamps(self):
+        """For how many lamps it suffices."""
+        return min(self.closures, int(min(self.numbers / self.LAMP, SLOTS)), SLOTS)
+
+    def cones(self, wanted):
+        """How many cones lamps get that want so many; the first ones come first."""
+        closures = self.closures - len(wanted)
+        numbers = self.numbers - self.LAMP * len(wanted)
+        found = []
+        for count in wanted:
+            more = max(min(count - 1, closures), 0) if numbers >= self.CONES else 0
+            closures, numbers = closures - more, numbers - self.CONES * (more > 0)
+            found.append(1 + more)
+        return found
+
+
 class Room(NamedTuple):
     """What the nodes of a material have room for."""
 

@@ -6,10 +6,12 @@ closures come from the generator (closures/closure.h). Without Open Shading Lang
 keeps at most 255 numbers at a time; a material that needs more is black.
 """
 
+import math
 from dataclasses import dataclass
 
 import bpy
 
+from .. import lamps
 from ..groups import model_nodes
 from ..packs import pack
 from ..trees import shader_trees
@@ -38,37 +40,52 @@ _PRINCIPLED_SLOTS = {
 }
 
 
+#: Numbers that Cycles keeps at a time without Open Shading Language.
+_STACK = 255
+#: How many of them a material with one model takes besides those of lamps (lamps.Budget) and of the
+#: model's formula (`numbers` in the manifest, of which at most _OF_FORMULA are not constants). With
+#: GLOG_v=3 in its environment, Blender prints the sum. With four area lamps 22 models were measured
+#: to take at most 164, `factors` 237. With all sockets linked, `charlie` takes 246 under eight,
+#: `ashikhmin_shirley` 249, and `microfacet` 238 under the seven that it has room for.
+_OF_MATERIAL, _OF_FORMULA = 85, 75
 #: How many lamps there is room for beside several models as Formula Nodes. Cycles computes what
-#: their parts have in common first, for all lamps, and keeps it. Of 255 numbers, two models were
-#: measured to need 223 under four area lamps (254 if one is `factors`), three 210 under three, four
-#: and five 183 under two. With GLOG_v=3 in its environment, Blender prints the number.
-_STACK_ROOM = {2: 4, 3: 3, 4: 2, 5: 2}
+#: their parts have in common first, for all lamps, and keeps it. Two models were measured to take
+#: 191 under four area lamps (227 if one is `factors`), three 181 under three, four and five 179
+#: under two.
+_LAMPS_BESIDE = {2: 4, 3: 3, 4: 2, 5: 2}
 
 
 @dataclass(frozen=True)
 class ClosureUsage:
-    """The closure slots that the shaders of a material take without lamps, and for each lamp; and
-    the number of its models that are Formula Nodes."""
+    """The closure slots that the shaders of a material take without lamps, and for each lamp; the
+    number of its models that are Formula Nodes, and the numbers that the largest of them keeps."""
 
     slots: int
     slots_per_lamp: int
     trees: int
+    numbers: int = 0
+
+    def budget(self):
+        """What it leaves for lamps; None if nothing aims at lamps."""
+        if not self.slots_per_lamp:
+            return None
+        return lamps.Budget(max((most() - self.slots) // self.slots_per_lamp, 0), self._numbers())
 
     def lamps(self):
         """How many lamps there is room for; None if nothing aims at lamps."""
-        if not self.slots_per_lamp:
-            return None
-        return min(self._slot_room(), self._stack_room())
+        budget = self.budget()
+        return None if budget is None else budget.lamps()
 
     def is_limited_by_stack(self):
         """Whether numbers are scarcer than slots."""
-        return self._stack_room() < self._slot_room()
+        budget = self.budget()
+        return budget.lamps() < min(budget.closures, lamps.SLOTS)
 
-    def _slot_room(self):
-        return max((most() - self.slots) // self.slots_per_lamp, 0)
-
-    def _stack_room(self):
-        return _STACK_ROOM.get(self.trees, 1) if self.trees > 1 else most()
+    def _numbers(self):
+        if self.trees > 1:
+            return lamps.Budget.LAMP * _LAMPS_BESIDE.get(self.trees, 1)
+        formula = min(self.numbers, _OF_FORMULA)
+        return _STACK - _OF_MATERIAL - formula if self.trees else math.inf
 
 
 def most():
@@ -97,25 +114,37 @@ def _times(node):
 def of_material(material):
     """The ClosureUsage of a material: of all nodes that its output for Cycles depends on."""
     a_lamp = pack.manifest()["closure_slots"]["lamp"]
-    slots, slots_per_lamp, trees = 0, 0, 0
+    slots, slots_per_lamp, trees, numbers = 0, 0, 0, 0
     for node in (shown.node for shown in shader_trees.shown(material)):
         if model_nodes.is_ours(node) and (made := model_nodes.manifest_entry(node)):
             aimed_at = made.form.get("lamps") or 0
             slots += _times(node) * (made.form.get("slots", 0) - aimed_at * a_lamp)
             slots_per_lamp += _times(node) * a_lamp * bool(aimed_at)
-            trees += bool(aimed_at) and model_nodes.identity(node).form == "nodes"
+            if aimed_at and model_nodes.identity(node).form == "nodes":
+                trees += 1
+                numbers = max(numbers, made.form.get("numbers", 0))
         else:
             slots += _times(node) * _native_slots(node)
-    return ClosureUsage(slots, slots_per_lamp, trees)
+    return ClosureUsage(slots, slots_per_lamp, trees, numbers)
+
+
+def _budgets():
+    """[(budget, material)] of the materials of the open file that aim at lamps."""
+    found = [(of_material(m).budget(), m) for m in bpy.data.materials if m.users]
+    return [(budget, material) for budget, material in found if budget is not None]
 
 
 def lamps_that_fit():
     """(count, material): how many lamps the materials of the open file can aim at, and the material
     that sets this limit. All materials share one list of lamps, so the largest material decides.
     None if no material aims at lamps."""
-    rooms = [
-        (room, material)
-        for material in bpy.data.materials
-        if material.users and (room := of_material(material).lamps()) is not None
-    ]
+    rooms = [(budget.lamps(), material) for budget, material in _budgets()]
     return min(rooms, key=lambda found: found[0], default=None)
+
+
+def budget_of_file():
+    """What the materials of the open file leave for lamps, all of which share one list."""
+    budgets = [budget for budget, _ in _budgets()]
+    if not budgets:
+        return lamps.Budget(most())
+    return lamps.Budget(*map(min, zip(*budgets, strict=True)))

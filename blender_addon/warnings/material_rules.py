@@ -28,7 +28,9 @@ def few_lamps(at):
     if not at.nodes or at.use.slots > most:
         return
     room = at.use.lamps()
-    if room is None or all(lamp.why != lamps.too_many(room) for lamp in at.of_scene.found_lamps):
+    if room in (None, lamps.SLOTS):
+        return
+    if all(lamp.why != lamps.too_many(room) for lamp in at.of_scene.found_lamps):
         return
     if at.use.is_limited_by_stack():
         taken = f"{at.use.trees} models as Formula Nodes, and Cycles keeps 255 numbers at a time"

@@ -64,7 +64,8 @@ template <class T> T count_of(const T& layout) { return select(in_grid(layout), 
 /// The cones of a rectangle, as seen from a shading point.
 template <class T> struct LampCones {
   T layout;
-  T sine;   ///< of their radius
+  T count;  ///< count_of(layout), which Cycles would keep for each lamp
+  T sine;   ///< of the radius that they would have in the middle of the lamp
   T alone;  ///< the sine of the radius of the largest cone about the middle of the lamp
   T moved;  ///< from the middle of the lamp to those of the outermost cones, in units of the half axis, divided by the
             ///< distance of the lamp
@@ -91,18 +92,15 @@ LampCones<T> cones_of_rectangle(const LampSlot<T>& slot, const LampAxes<T>& lamp
   const T longer2 = maximum(at_a2, at_b2), ratio = sqrt(longer2 / minimum(at_a2, at_b2));
   const auto more_than = [&](double limit) { return select(T(limit) < ratio, T(1), T(0)); };
   LampCones<T> cones;
-  const auto grid = many && wide && ratio < T(kLong);
+  const auto grid = many && wide && T(3.5) < slot.most && ratio < T(kLong);
   const T in_row = select(many, minimum(slot.most, T(1) + more_than(kTwo) + more_than(2) + more_than(3)), T(1));
   const T row = select(T(1.5) < in_row, T(1) - T(1) / ratio, T(0));
-  cones.layout = select(grid, T(kGrid), select(a_is_longer, in_row, -in_row));
-  const T moved = select(grid, T(0.5), row);
-  cones.moved = moved / sqrt(c2);
-  // All have the size of the farthest one.
-  const T along_row = row * (row * select(a_is_longer, a2, b2) + T(2) * select(a_is_longer, ac, bc));
-  const T end2 = c2 + select(grid, (a2 + b2) / T(4) + ac + bc, along_row);
+  cones.layout = select(many, select(grid, T(kGrid), select(a_is_longer, in_row, -in_row)), T(1));
+  cones.count = select(grid, T(4), in_row);
+  cones.moved = select(grid, T(0.5), row) / sqrt(c2);
   const T volume = lamp.half_across * lamp.half_along * abs(dot(lamp.away, centre));
-  cones.sine = volume / sqrt(longer2 * end2) * select(grid, T(0.5), T(1));
   cones.alone = volume / sqrt(longer2 * c2);
+  cones.sine = cones.alone * select(grid, T(0.5), T(1));
   return cones;
 }
 
@@ -114,9 +112,8 @@ template <class T> struct LampCone {
   LampCones<T> cones;  ///< of a rectangle
   T part_across, part_along;  ///< see Risen; 1 for other lamps
   T drop;                     ///< 1 - cos of the radius of a ball or a sun
-  T of_cones;                 ///< solid angle of all cones
-  T solid_angle;              ///< the same, or 0 for a lamp that drawn directions can't hit
-  T chord;                    ///< radius of the lamp; for a flat one that of the closure, otherwise with a seam
+  T of_cones;                 ///< solid angle of all cones, if they were in the middle of the lamp
+  T chord;                    ///< radius of a ball or a sun, with a seam
   T reach;                    ///< radius of a cone around the whole lamp
   T inner;                    ///< radius of the largest cone about its middle that a flat lamp fills
   T flat;                     ///< 1 for a rectangle or an ellipse, otherwise 0
@@ -126,6 +123,8 @@ template <class T> struct LampCone {
   T clear;                    ///< divides the light: see cone_of() and cone_aside()
 };
 
+/// The sine of the radius of the widest cone.
+inline constexpr double kWidest = 0.832;
 /// Half the width of the lobe of a drawn direction, which is also its minimum distance from lamps.
 inline constexpr double kNarrow = 1e-3;
 
@@ -175,10 +174,9 @@ Risen<T> risen(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& 
 /// already accounts for them.
 template <class T> LampCone<T> cone_of(const LampSlot<T>& given, const LampAxes<T>& whole, const Vec3<T>& at,
                                        const Vec3<T>& wo, const Vec3<T>& normal) {
-  /// kWidest is the sine of the widest cone's radius, kPoint that of lamps without size. kInside is the squared sine
-  /// of a ball from which drawn directions meet it often enough. kLeastRise is the minimum height of the cone's rim
+  /// kPoint is the sine of the radius of lamps without size. kInside is the squared sine of a ball from which drawn directions meet it often enough. kLeastRise is the minimum height of the cone's rim
   /// over the horizon of the closure's normal.
-  constexpr double kWidest = 0.832, kInside = 0.95, kPoint = 1e-4, kLeastRise = 0.01;
+  constexpr double kInside = 0.95, kPoint = 1e-4, kLeastRise = 0.01;
   // f is averaged over the whole lamp, with zeros below the horizon. If a smaller part of a mesh is above the horizon,
   // light is lost; otherwise few samples would have to carry it.
   constexpr double kLeastPart = 0.05;
@@ -236,11 +234,8 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& given, const LampAxes<
   const auto drop_of = [](const T& sine2) { return sine2 / (T(1) + sqrt(T(1) - sine2)); };
   const T whole_drop = drop_of(sqr(size)), drop = drop_of(sqr(sine));
   cone.drop = whole_drop;
-  cone.of_cones = count_of(cone.cones.layout) * drop * T(2 * kPi);
-  // blender_addon/lamps/slots.py: the first size is negative for lamps that drawn directions don't hit.
-  cone.solid_angle = select(T(0) < slot.shape.y, cone.of_cones, T(0));
-  // The cones of a rectangle carry all of the rectangle's light, so they must not be widened.
-  cone.chord = sqrt(T(2) * select(flat, drop, whole_drop)) + select(flat, T(0), T(2 * kNarrow));
+  cone.of_cones = cone.cones.count * drop * T(2 * kPi);
+  cone.chord = sqrt(T(2) * whole_drop) + T(2 * kNarrow);
   cone.reach = select(flat, diagonal + T(2 * kNarrow), cone.chord) + lift;
   const T inner = select(lift < T(kPoint) && !(rectangle && T(0.5) < part.cut),
                          minimum(select(kind < T(3.5), cone.cones.alone, size), room), T(0));
@@ -275,6 +270,7 @@ template <class T> struct ConeOfPart {
   Vec3<T> axis;
   T chord;  ///< its radius
 };
+/// `most`: how many the lamp may have.
 template <class T>
 ConeOfPart<T> cone_at(const T& most, const LampAxes<T>& lamp, const LampCone<T>& cone, const LampPart<T>& part) {
   const T layout = cone.cones.layout;
@@ -286,10 +282,11 @@ ConeOfPart<T> cone_at(const T& most, const LampAxes<T>& lamp, const LampCone<T>&
       cone.aim + (lamp.across * (lamp.half_across * x) + lamp.along * (lamp.half_along * y)) * cone.cones.moved;
   const T shorter = T(1) / sqrt(dot(axis, axis));
   // The nearer a part is, the larger it looks.
-  const T sine = cone.cones.alone * minimum(shorter * select(grid, T(0.5), T(1)), T(1));
-  const T drop2 = T(2) * sqr(sine) / (T(1) + sqrt(T(1) - sqr(sine)));
+  const T middle2 = cone.of_cones / (count_of(layout) * T(kPi));
+  const T sine2 = minimum(middle2 * (T(1) - middle2 / T(4)) * sqr(shorter), T(kWidest * kWidest));
+  const T chord2 = T(2) * sine2 / (T(1) + sqrt(T(1) - sine2));
   const auto several = T(1.5) < most && T(1.5) < count_of(layout);
-  return {select(several, axis * shorter, cone.aim), select(several, sqrt(drop2), cone.chord)};
+  return {select(several, axis * shorter, cone.aim), sqrt(select(several, chord2, middle2))};
 }
 
 /// The solid angle that a point of a rectangle or an ellipse stands for, divided by `of_cones`, that of all cones
@@ -307,7 +304,7 @@ template <class T> T part_of_area(const LampCone<T>& cone) { return abs(cone.par
 /// A cone within a flat lamp, beside a small lamp in front of it or behind it.
 template <class T> struct ConeAside {
   Vec3<T> towards;  ///< unit vector along its axis
-  T chord;          ///< its radius
+  T of_cones;       ///< its solid angle
   T clear;          ///< LampCone::clear
   T fits;           ///< 1 if the other lamp is small enough, otherwise 0
 };
@@ -351,8 +348,9 @@ template <class T> ConeAside<T> cone_aside(const LampSlot<T>& slot, const LampAx
   const Vec3<T> away = towards - other;
   const T distance = length(away);
   ConeAside<T> out;
-  out.chord = minimum((inner + distance - other_radius) / T(2), inner) * T(kMargin);
-  const Vec3<T> middle = towards + away * ((inner - out.chord) / distance);
+  const T chord = minimum((inner + distance - other_radius) / T(2), inner) * T(kMargin);
+  out.of_cones = sqr(chord) * T(kPi);
+  const Vec3<T> middle = towards + away * ((inner - chord) / distance);
   out.towards = middle * (T(1) / length(middle));
   // Light samples of the wide lamp that meet the cone of the small one have light there.
   const Vec3<T> centre = slot.place - at;
@@ -394,18 +392,24 @@ template <class T> FlatPoint<T> flat_point(const LampSlot<T>& slot, const LampAx
   return out;
 }
 
+/// The solid angle of a lamp's cones, or 0 for one that drawn directions can't hit: its first size is negative
+/// (blender_addon/lamps/slots.py).
+template <class T> T met_angle(const Vec3<T>& shape, const LampCone<T>& cone) {
+  return select(T(0) < shape.y, cone.of_cones, T(0));
+}
+
 /// The part of f cos in one direction that the lamp's closure carries; the drawn direction carries the rest of it.
-/// `density`: pdf of drawn directions there. `emphasis`: 1 for a ball or a sun.
+/// `solid_angle`: met_angle(). `density`: pdf of drawn directions there. `emphasis`: 1 for a ball or a sun.
 ///
 /// Cycles follows one closure at a time, so the part of a drawn direction is noisy unless it is small or nearly
 /// everything. The closure is only as noisy as f is uneven over the lamp. So it keeps its light until drawn directions
 /// hit the lamp so often that the lobe must be narrower than the lamp, and then gives it up quickly.
-template <class T> T part_of_lamp(const LampCone<T>& cone, const T& emphasis, const T& density) {
+template <class T> T part_of_lamp(const T& solid_angle, const T& emphasis, const T& density) {
   /// Where both carry one half: the density, in units of that of a uniform point of the lamp.
   constexpr double kEqual = 2;
   // The point of a rectangle has the pdf 1 / (solid_angle emphasis), and since Cycles samples all of the rectangle,
   // only one sample in `emphasis` meets its cone.
-  const T ratio = density * (cone.solid_angle * sqr(emphasis)) * T(1 / kEqual);
+  const T ratio = density * (solid_angle * sqr(emphasis)) * T(1 / kEqual);
   return T(1) / (T(1) + sqr(sqr(ratio)));
 }
 
@@ -421,8 +425,9 @@ template <class T> T met_part(const LampSlot<T>& slot, const LampAxes<T>& lamp, 
   const T farthest = select(round, maximum(x, T(0)) * x + maximum(y, T(0)) * y, maximum(x, y));
   const auto on_flat = farthest < T(1) && T(0) < p.slope;
   const T met = select(flat, select(on_flat, T(1), T(0)), select(length(ray - cone.towards) < cone.chord, T(1), T(0)));
-  const T emphasis = emphasis_at(slot, lamp, p.slope, sqr(p.distance), cone.solid_angle) * part_of_area(cone);
-  return met * part_of_lamp(cone, select(flat, emphasis, times_cone(cone, cone.solid_angle)), density);
+  const T solid_angle = met_angle(slot.shape, cone);
+  const T emphasis = emphasis_at(slot, lamp, p.slope, sqr(p.distance), solid_angle) * part_of_area(cone);
+  return met * part_of_lamp(solid_angle, select(flat, emphasis, times_cone(cone, solid_angle)), density);
 }
 
 /// Russian roulette for a closure with a small weight, which Cycles would drop: it is kept at random, with a weight
@@ -439,12 +444,13 @@ template <class T> struct ToonLobe {
   Rgb<T> color;
   T size;  ///< in units of 90 degrees, as in the node
 };
-/// `room`: the radius that it may have without covering another lamp. `emphasis`, `density`: at the point where the
-/// value is taken.
-template <class T> ToonLobe<T> toon_lobe(const LampCone<T>& cone, const T& emphasis, const T& density, const T& room,
-                                         const Rgb<T>& value, const T& u) {
+/// `of_part`: the radius of a cone within a flat lamp. `room`: the radius that a cone may have without covering another
+/// lamp. `emphasis`, `density`: at the point where the value is taken.
+template <class T> ToonLobe<T> toon_lobe(const Vec3<T>& shape, const LampCone<T>& cone, const T& of_part,
+                                         const T& emphasis, const T& density, const T& room, const Rgb<T>& value,
+                                         const T& u) {
   constexpr double kWidened = 2e-4;
-  const T factor = emphasis * part_of_lamp(cone, emphasis, density) / cone.clear;
+  const T factor = emphasis * part_of_lamp(met_angle(shape, cone), emphasis, density) / cone.clear;
   const T largest = max_component(value) * factor;
   const T wide = minimum(sqrt(T(kWidened / kPi) / largest), room);
   // A cone within its lamp has a fixed size.
@@ -452,7 +458,7 @@ template <class T> ToonLobe<T> toon_lobe(const LampCone<T>& cone, const T& empha
   const auto is_smaller = T(1.0001) < times_cone(cone, cone.of_cones);
   const auto is_fixed = select(is_flat, T(1), select(is_smaller, T(1), T(0))) > T(0.5);
   const T within2 = cone.of_cones / (count_of(cone.cones.layout) * T(kPi));
-  const T chord = select(is_fixed, select(is_flat, cone.chord, sqrt(within2)), maximum(cone.chord, wide));
+  const T chord = select(is_fixed, select(is_flat, of_part, sqrt(within2)), maximum(cone.chord, wide));
   const T chord2 = chord * chord;
   // A cone that was moved aside is smaller, and carries the same light.
   const T extent = select(is_fixed, within2, chord2) * T(kPi);

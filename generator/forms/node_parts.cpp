@@ -95,7 +95,6 @@ NodeProgram record_cone() {
     p.output("part_along", cone.part_along);
     p.output("drop", cone.drop);
     p.output("of_cones", cone.of_cones);
-    p.output("solid_angle", cone.solid_angle);
     p.output("chord", cone.chord);
     p.output("reach", cone.reach);
     p.output("inner", cone.inner);
@@ -106,7 +105,6 @@ NodeProgram record_cone() {
     p.output("layout", cone.cones.layout);
     p.output("clear", cone.clear);
     p.output("moved", cone.cones.moved);
-    p.output("alone", cone.cones.alone);
   });
 }
 NodeProgram record_cone_at() {
@@ -116,11 +114,10 @@ NodeProgram record_cone_at() {
     cone.cones.layout = Expr::input("layout");
     cone.cones.moved = Expr::input("moved");
     take_part(cone);
-    cone.cones.alone = Expr::input("alone");
-    cone.chord = Expr::input("chord");
+    cone.of_cones = Expr::input("of_cones");
     const ConeOfPart<Expr> found = cone_at(Expr::input("most"), axes_input(), cone, part_input());
     p.output("axis", found.axis);
-    p.output("chord", found.chord);
+    p.output("of_part", found.chord);
   });
 }
 NodeProgram record_aside() {
@@ -128,7 +125,7 @@ NodeProgram record_aside() {
     const ConeAside<Expr> aside = cone_aside(slot_input(), axes_input(), input3("at"), input3("towards"),
                                              Expr::input("inner"), input3("other"), Expr::input("other_radius"));
     p.output("axis", aside.towards);
-    p.output("chord", aside.chord);
+    p.output("of_cones", aside.of_cones);
     p.output("clear", aside.clear);
     p.output("fits", aside.fits);
   });
@@ -150,7 +147,7 @@ NodeProgram record_met() {
     LampCone<Expr> cone;
     cone.towards = input3("towards");
     cone.chord = Expr::input("chord");
-    cone.solid_angle = Expr::input("solid_angle");
+    cone.of_cones = Expr::input("of_cones");
     cone.drop = Expr::input("drop");
     take_part(cone);
     p.output("met", met_part(slot_input(), axes_input(), input3("at"), cone, input3("ray"), Expr::input("density")));
@@ -162,12 +159,11 @@ NodeProgram record_lobe() {
     cone.chord = Expr::input("chord");
     cone.flat = Expr::input("flat");
     cone.of_cones = Expr::input("of_cones");
-    cone.solid_angle = Expr::input("solid_angle");
     cone.clear = Expr::input("clear");
     cone.cones.layout = Expr::input("layout");
     cone.drop = Expr::input("drop");
     const Expr emphasis = select(cone.flat > Expr(0.5), Expr::input("emphasis"), times_cone(cone, cone.of_cones));
-    const ToonLobe<Expr> lobe = toon_lobe(cone, emphasis, Expr::input("density"), Expr::input("room"),
+    const ToonLobe<Expr> lobe = toon_lobe(input3("shape"), cone, Expr::input("of_part"), emphasis, Expr::input("density"), Expr::input("room"),
                                           Rgb<Expr>::input("value"), Expr::input("u_2"));
     p.output("color", lobe.color);
     p.output("size", lobe.size);

@@ -233,6 +233,13 @@ ParamValues confined(const Model& model, const ParamValues& fixed) {
   return operations > kMostOperations ? all : out;
 }
 
+/// How many numbers Cycles keeps while it computes a part: those that the part needs and those in between.
+int numbers_kept(const Json& part) {
+  int kept = part.at("live");
+  for (const Json& input : part.at("inputs")) kept += input.at(1) == "VECTOR" ? 3 : 1;
+  return kept;
+}
+
 class Nodes final : public Form {
  public:
   Nodes() : Form("nodes") {}
@@ -306,6 +313,7 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
     add("met", record_met());
     add("lobe", record_lobe());
     out.lamps = max_lamps;
+    out.numbers = numbers_kept(parts.at("value"));
   }
   out.closures = int(first.closures.size() + first.of_base.size()) + int(parts.contains("draw")) + out.lamps;
   // The extension subtracts the slots of lamps that are not in use, with the count per lamp that other forms have.

@@ -13,6 +13,7 @@ struct Shader {
   std::string albedo;    ///< source of a separate shader for the Albedo output; empty if `source` contains it
   int closures = 0;      ///< maximum number of closures that one shading point adds
   int slots = 0;         ///< slots that they take, of Cycles' kMaxClosures
+  int numbers = 0;       ///< that Cycles keeps at a time for the formula of a lamp, if it consists of Blender's nodes
   int operations = 0;    ///< maximum over the combinations of choices; the body of a loop counts once
   int statements = 0;    ///< for all combinations of choices, without the library functions
   bool facets = false;   ///< uses microfacet closures

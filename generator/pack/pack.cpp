@@ -159,6 +159,7 @@ BuiltModel build_model(const plan::PlannedModel& plan, const measure::AlbedoTabl
         {"only", values_json(form->values(model, plan.fixed))},
         {"closures", shader.closures},
         {"slots", shader.slots},
+        {"numbers", shader.numbers},
         {"operations", shader.operations},
         {"error", error_json(error)},
         {"cost", cost ? Json(*cost) : Json()},

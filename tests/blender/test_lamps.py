@@ -188,7 +188,8 @@ def test_cones_of_rectangles(extension, ball, empty, monkeypatch):
     faint = add_lamp(empty, "AREA", "Faint", (5, 0, 9), shape="RECTANGLE", size=1.0, size_y=0.1)
     faint.data.energy = 0.01
     filling = import_module(f"{extension.package}.lamps.filling")
-    monkeypatch.setattr(filling, "_room", lambda: (5, None))
+    budget = import_module(f"{extension.package}.lamps.slots").Budget
+    monkeypatch.setattr(filling, "budget_of_file", lambda: budget(5))
     extension.api.see_lamps(empty)
     assert sorted(codes(empty)) == [(1, 0), (4, 0)]
     # Shaders of another version would take these numbers for other kinds of lamps.
