@@ -45,6 +45,8 @@ class Part:
     #: channel is the factor, and the model has the colour divided by it.
     scale: float = 1.0
     flat: str = ""
+    #: A parameter that is the root of a linked colour, and the socket of that colour.
+    root: tuple = ()
 
     @property
     def label(self):
@@ -135,6 +137,7 @@ class Plan(Part):
             found |= set(ANISOTROPY[KINDS[self.node.bl_idname]])
         found |= {part.again[3] for part in parts if part.again}
         found |= {part.flat for part in parts if part.flat}
+        found |= {part.root[1] for part in parts if part.root}
         found |= {"Metallic"} if self.metal else set()
         found |= {"Alpha"} if self.transparent else set()
         return found | ({"Emission Color", "Emission Strength"} if self.glows else set())

@@ -39,20 +39,21 @@ from .seen_node import SeenNode
 
 #: The model of smooth glass.
 _CLEAR = "fresnel_dielectric"
-#: Glass is white if no channel of its colour is farther from 1. Two surfaces double this.
-_WHITE = 0.005
 
 
 def _plan_glass(material, node, inputs):
     inputs.setting("mute")
     inputs.check_unknown(KNOWN_SOCKETS["glass"])
-    color, roughness = inputs.value("Color"), inputs.value("Roughness")
-    if roughness > 1e-3:
+    if inputs.value("Roughness") > 1e-3:
         raise Refused(say("no model is of rough glass"))
     if inputs.value("Thin Film Thickness") != 0:
         raise Refused(say("it has {what}", what=Sentence("Thin Film")))
     # Blender's glass tints both reflected and transmitted light.
-    return _glass_of(material, node, inputs, "Color", [max(c, 0.0) for c in color])
+    tints = ("refracted", "reflected")
+    if inputs.follows("Color"):
+        return _glass_of(material, node, inputs, {}, dict.fromkeys(tints, "Color"))
+    color = tuple(max(c, 0.0) for c in inputs.constant("Color"))
+    return _glass_of(material, node, inputs, dict.fromkeys(tints, color), {})
 
 
 def _is_clear(inputs):
@@ -72,29 +73,24 @@ def _plan_clear(material, node, inputs):
         raise Refused(say("it has {what}", what=Sentence("Specular IOR Level")))
     if inputs.value("Specular Tint", (1.0, 1.0, 1.0)) != (1, 1, 1):
         raise Refused(say("it has {what}", what=Sentence("Specular Tint")))
-    # Such a node tints the transmitted light alone.
-    tint = [min(max(c, 0.0), 1.0) ** 0.5 for c in inputs.value("Base Color")]
+    # Such a node tints the transmitted light alone, at each surface by the root of its colour.
     more = {"glows": glows(inputs), "transparent": is_transparent(inputs)}
-    return _glass_of(material, node, inputs, "Base Color", tint, **more)
+    if inputs.follows("Base Color"):
+        more["root"] = ("refracted", "Base Color")
+        return _glass_of(material, node, inputs, {}, {}, **more)
+    tint = tuple(min(max(c, 0.0), 1.0) ** 0.5 for c in inputs.constant("Base Color"))
+    return _glass_of(material, node, inputs, {"refracted": tint}, {}, **more)
 
 
-def _glass_of(material, node, inputs, color, tint, **more):
-    """The Plan for smooth glass, which its socket `color` tints."""
+def _glass_of(material, node, inputs, tints, links, **more):
+    """The Plan for smooth glass. `tints`: values of the model's tints; `links`: those that a socket
+    of the node controls."""
     if _CLEAR not in pack.model_names():
         raise Refused(say("this extension lacks the models that are near: {models}", models=_CLEAR))
-    if any(abs(1 - c) > _WHITE for c in tint):
-        # Light passes two surfaces or more, and pictures of white glass show no colour at all: an
-        # error of one surface would be no warning.
-        said = say(
-            "its {socket} is not white, and {model} has no colour",
-            socket=Sentence(color),
-            model=pack.model(_CLEAR).label,
-        )
-        raise Refused(said)
-    values = {} if inputs.follows("IOR") else {"ior": inputs.constant("IOR")}
-    part = Part(_CLEAR, values, {"ior": "IOR"})
+    values = tints | ({} if inputs.follows("IOR") else {"ior": inputs.constant("IOR")})
+    part = Part(_CLEAR, values, {"ior": "IOR", **links})
     found = {"material": material, "node": node, "error": 0.0, "least_error": 0.0}
-    return Plan(**vars(part), **found, **more)
+    return Plan(**vars(part) | more, **found)
 
 
 def _check_ranges(parts):

@@ -37,7 +37,11 @@ class PreparedPart:
     @property
     def known(self):
         """The values, with None for linked parameters."""
-        linked = (*self.part.links, *(("f0", "tint") if self.part.flat else ()))
+        linked = (
+            *self.part.links,
+            *(("f0", "tint") if self.part.flat else ()),
+            *self.part.root[:1],
+        )
         return self.values | dict.fromkeys(linked)
 
 
@@ -159,6 +163,9 @@ class Replacement:
                 tree.links.new(source, present[name])
         if prepared.part.again:
             tree.links.new(self._again(prepared.part.again), present["again"])
+        if prepared.part.root:
+            name, color = prepared.part.root
+            tree.links.new(self._root(color), present[name])
         if prepared.part.flat:
             self._brightest = self._flat(prepared.part.flat, present)
         for name, *law in prepared.part.widths:
@@ -267,6 +274,15 @@ class Replacement:
         lost = self._operation("ShaderNodeMath", "SUBTRACT", mean, 1.0)
         left = vector("MULTIPLY_ADD", average, lost, 1.0)
         return vector("DIVIDE", vector("MULTIPLY", average, mean), left)
+
+    def _root(self, color):
+        """Nodes for the root of a linked colour, each channel of which is held between 0 and 1."""
+        held = self._operation("ShaderNodeVectorMath", "MAXIMUM", self._source(color), 0.0)
+        held = self._operation("ShaderNodeVectorMath", "MINIMUM", held, 1.0)
+        root = self._helper("ShaderNodeGamma")
+        root.inputs["Gamma"].default_value = 0.5
+        self._tree.links.new(held, root.inputs["Color"])
+        return root.outputs[0]
 
     def _flat(self, color, present):
         """Nodes for the values of a model that reflects a linked colour at all angles. Returns the
