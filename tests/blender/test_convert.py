@@ -448,6 +448,28 @@ def test_a_picture_of_clear_plastic_is_that_of_glass(extension, convert, empty, 
     assert convert.restore(material) == 1 and node.outputs[0].is_linked
 
 
+@pytest.mark.parametrize("color", [(1.0, 0.7, 0.3), (0.8, 0.1, 0.1)])
+@pytest.mark.parametrize(
+    ("roughness", "model"), [(0.1, "blinn"), (0.3, "blinn"), (0.5, "microfacet")]
+)
+def test_a_coloured_beckmann_node_takes_the_nearer_lobe(
+    extension, convert, color, roughness, model
+):
+    """`microfacet` has the node's own facets, but reflects a colour that changes with the angle;
+    `blinn` has one colour, and nearly the same lobe if it is narrow."""
+    (plan,) = convert.plan([material_of("glossy", "BECKMANN", Color=color, Roughness=roughness)[0]])
+    errors = {}
+    for name in ("blinn", "microfacet"):
+        node = material_of("glossy", "BECKMANN", Color=color, Roughness=roughness)[1]
+        fit = nearest_model(convert).nearest(
+            tuple(convert.natives(node)), (color,), False, lambda m, _, name=name: m == name
+        )
+        ((_, errors[name]),) = fit.found
+    print(errors, plan.line())
+    assert plan.model == model == min(errors, key=errors.get)
+    assert plan.error == pytest.approx(errors[model], abs=1e-6) and plan.error < 0.011
+
+
 def tinted_glass(kind, color):
     """Glass of a colour; None: one that varies over the surface, beyond 0 and 1."""
     given = {"Roughness": 0.0, "IOR": 1.4} if kind == "glass" else CLEAR
