@@ -412,6 +412,44 @@ def test_a_picture_of_a_rough_metal_is_as_before(extension, convert, empty, roug
     assert {n.name for n in tree.nodes} == names
 
 
+FOLLOWED = {
+    "Specular IOR Level": ((0.03, 0.03, 0.03), (1.4, 1.4, 1.4)),
+    "Specular Tint": ((1.0, 0.6, 0.1), (0.1, 0.3, 0.2)),
+    "Diffuse Roughness": ((0.1, 0.1, 0.1), (0.9, 0.9, 0.9)),
+}
+
+
+@pytest.mark.parametrize("osl", [False, True])
+@pytest.mark.parametrize("distribution", ["GGX", "MULTI_GGX"])
+@pytest.mark.parametrize("socket", FOLLOWED)
+def test_a_plastic_follows_its_linked_inputs(extension, convert, empty, socket, distribution, osl):
+    """In a white world: as plastics with these values do, whose errors other tests compare with
+    pictures; and back again."""
+    given, held = {"Base_Color": GOLD, "Roughness": 0.4}, FOLLOWED[socket]
+    material, node = material_of("principled", distribution, **given)
+    tree = material.node_tree
+    picture = picture_node(tree, *held)
+    tree.links.new(picture.outputs["Color"], node.inputs[socket])
+    names = {n.name for n in tree.nodes}
+    empty.cycles.shading_system = osl
+    before = flat(empty, material)
+    plan = only(extension.api.plan_conversion([material]))
+    print(plan.line())
+    assert extension.api.convert_materials([plan]) == 1 and plan.error < 0.03
+    after = flat(empty, material)
+    for i, value in enumerate(held):
+        alone, other = material_of("principled", distribution, **given)
+        is_color = other.inputs[socket].type == "RGBA"
+        # A level above 1 is taken for 1.
+        other.inputs[socket].default_value = (*value, 1.0) if is_color else min(value[0], 1.0)
+        assert extension.api.convert_materials(extension.api.plan_conversion([alone])) == 1
+        wanted = flat(empty, alone)[i]
+        print(f"{value}: Blender {before[i]}, as one value {wanted}, linked {after[i]}")
+        assert after[i] == pytest.approx(wanted, abs=0.001)
+    assert convert.restore(material) == 1
+    assert {n.name for n in tree.nodes} == names
+
+
 CLEAR = {"Transmission_Weight": 1.0, "Roughness": 0.0, "IOR": 1.4}
 
 
@@ -841,6 +879,32 @@ REFUSED = [
     ("glass", {"IOR": 12.0}, "IOR of Fresnel Dielectric would be 12, and may be 0.1 to 10"),
     ("principled", {"IOR": 0.7}, "its IOR is below 1"),
 ]
+
+
+def test_a_black_base_needs_no_roughness(extension, convert):
+    material, node = material_of("principled", Base_Color=(0.0, 0.0, 0.0))
+    linked(material, node, "Diffuse Roughness", "ShaderNodeTexNoise")
+    assert not only(convert.plan([material])).refusal
+
+
+#: Links beside a noisy Roughness, or to what has no model that follows them.
+TWO_LINKS = [
+    ({}, ("Specular IOR Level", "Roughness"), "Specular IOR Level and Roughness are linked, and"),
+    ({}, ("Specular IOR Level", "Specular Tint"), "Level and Specular Tint are linked, and only"),
+    ({"Roughness": 0.0}, ("Specular IOR Level",), "Level is linked, and converts only as one"),
+    ({"Roughness": 0.0}, ("Diffuse Roughness",), "Roughness is linked, and converts only as one"),
+    ({"Metallic": 1.0}, ("Specular Tint",), "Tint is linked, and converts only as one value"),
+    ({"Metallic": 0.5}, ("Specular Tint",), "Tint is linked, and converts only as one value"),
+]
+
+
+@pytest.mark.parametrize(("inputs", "sockets", "why"), TWO_LINKS)
+def test_links_that_no_model_follows_are_named(extension, convert, inputs, sockets, why):
+    material, node = material_of("principled", **inputs)
+    for socket in sockets:
+        linked(material, node, socket, "ShaderNodeTexNoise")
+    assert why in only(convert.plan([material])).line()
+
 
 LINKED = [
     ("principled", {"Metallic": 0.5}, "IOR"),
