@@ -21,7 +21,8 @@ model, and without either; fits with microfacets, and with other lobes only; aim
 of microfacets, without a base, with a mirror, and with a base of ramps, which have the scene's
 lamps in their slots. `coupled` has r0 = 0.5, the others their defaults. Blender's own Diffuse and
 Glossy nodes are included for comparison. `tests/blender/test_every_fit.py` measures the same for
-fitted forms and twins of every model.
+fitted forms and twins of every model. Formula Nodes are not among the tables: `evidence/conditions
+--form nodes` measures them, and [their page](nodes.md#settings-and-passes) says what it found.
 
 Tilted normals are those of the mesh, those of the input Normal, and the latter with Bump Map
 Correction on. The cell is the worst of three views: the fraction lost of all the light that the

@@ -7,6 +7,8 @@ from . import extension
 from .i18n import say
 
 _registered = False
+#: Whether this process has said that it enabled the extension.
+_said = False
 
 
 def set_registered(value):
@@ -19,8 +21,11 @@ def enable():
     """Enables the extension for this session if it is disabled. Raises RuntimeError.
 
     Blender lets scripts import the package of an extension that is disabled. Without its handlers,
-    materials would keep the lamps that they were made with, and look wrong after any change.
+    materials would keep the lamps that they were made with, and look wrong after any change. The
+    preferences stay as they are. wm.read_factory_settings, with which many scripts begin a file,
+    reads preferences without any extension, and so disables this one each time. That is said once.
     """
+    global _said
     if _registered:
         return
     name, errors = extension.PACKAGE, []
@@ -30,4 +35,6 @@ def enable():
         raise RuntimeError(
             say("Extension {name} can't be enabled: {reason}", name=name, reason=reason)
         )
-    print(f"brdfc: {name} was disabled; enabled for this session", flush=True)
+    if not _said:
+        print(f"brdfc: {name} was disabled; enabled for this session", flush=True)
+    _said = True

@@ -71,25 +71,33 @@ class _Formula:
         }
 
 
-def _is_part(group):
+def is_part(group):
+    """Whether a group of the open file is a part."""
     return group.library is None and PART in group
 
 
 def _find(digest, among=None):
     for group in bpy.data.node_groups if among is None else among:
-        if _is_part(group) and group[PART] == digest:
+        if is_part(group) and group[PART] == digest:
             return group
     return None
 
 
 def _appended(digest):
     """The kept group of a part, or None. If the file already has an equal part, that one stays."""
-    own = {group[PART]: group for group in bpy.data.node_groups if _is_part(group)}
     made = kept_groups.append(digest)
     wanted = _find(digest, made)
     if wanted is None:
         bpy.data.batch_remove(made)
         return None
+    merge_copies(made)
+    return wanted
+
+
+def merge_copies(made):
+    """Replaces parts among groups that were just appended by equal parts that the file had."""
+    new = set(made)
+    own = {g[PART]: g for g in bpy.data.node_groups if is_part(g) and g not in new}
     # Nodes of these groups alone can use them. Blender's own function, user_remap, and the removal
     # of single groups examine the whole file for each group.
     extra = {group: own[group[PART]] for group in made if group.get(PART) in own}
@@ -99,7 +107,6 @@ def _appended(digest):
             if inner in extra:
                 node.node_tree = extra[inner]
     bpy.data.batch_remove(extra)
-    return wanted
 
 
 def make_group(title, content, inputs, outputs, fill, kept=False):
@@ -242,5 +249,5 @@ class Parts:
 def remove_unused_parts():
     """Removes the part groups that no model uses from the file."""
     # Removing a group may leave further ones without a user.
-    while unused := [g for g in bpy.data.node_groups if _is_part(g) and g.users == 0]:
+    while unused := [g for g in bpy.data.node_groups if is_part(g) and g.users == 0]:
         bpy.data.batch_remove(unused)

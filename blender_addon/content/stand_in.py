@@ -63,7 +63,8 @@ def keep_one_text():
 #: each socket.
 _NODES = {
     "glass": ("ShaderNodeBsdfGlass", {"IOR": "ior"}),
-    "fresnel_dielectric": ("ShaderNodeBsdfGlass", {"IOR": "ior"}),
+    # Its colour tints what is reflected as well, which is little beside what is refracted.
+    "fresnel_dielectric": ("ShaderNodeBsdfGlass", {"IOR": "ior", "Color": "refracted"}),
     "fresnel_conductor": (
         "ShaderNodeBsdfMetallic",
         {"IOR": ("n_r", "n_g", "n_b"), "Extinction": ("k_r", "k_g", "k_b")},
@@ -89,7 +90,8 @@ def node_of(group, form, parameters):
         if name in parameters:
             group.links.new(parameters[name], socket)
         else:
-            socket.default_value = form.constants[name]
+            value = form.constants[name]
+            socket.default_value = (*value, 1.0) if isinstance(value, (tuple, list)) else value
 
     for name, source in given.items():
         if isinstance(source, str):

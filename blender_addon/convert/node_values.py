@@ -7,7 +7,7 @@ import functools
 import bpy
 
 from ..common.i18n import Sentence, say
-from ..nearest import native_bsdf
+from ..nearest import native_bsdf, specular
 from ..nearest.native_bsdf import Native
 from ..trees import animation, shader_trees, shader_values
 
@@ -183,7 +183,7 @@ class Inputs:
             what = Sentence(name)
             if self.moves(name):
                 raise Refused(say("{socket} is animated", socket=what))
-            raise Refused(say("{socket} is linked", socket=what))
+            raise Refused(say("{socket} is linked, and converts only as one value", socket=what))
         return self.constant(name)
 
     def colors(self, name):
@@ -236,7 +236,7 @@ def given_of(node, inputs):
     kind = KINDS[node.bl_idname]
     inputs.setting("mute")
     inputs.check_unknown(KNOWN_SOCKETS[kind])
-    given = {"kind": kind, "color": inputs.colors(color_of(kind))[0]}
+    given, bases = {"kind": kind, "color": inputs.colors(color_of(kind))[0]}, (0.0,)
     if kind in ("glossy", "principled"):
         distribution = inputs.setting("distribution")
         if distribution not in ("GGX", "MULTI_GGX", "BECKMANN"):
@@ -248,27 +248,61 @@ def given_of(node, inputs):
         check_off(inputs)
         metallic = 0.5 if (known := inputs.mean("Metallic")) is None else known
         given["metallic"] = min(max(metallic, 0.0), 1.0)
-        if inputs.follows("Metallic") or given["metallic"] < 1:
+        if is_plastic(inputs):
             given["f0"] = _f0_of(inputs)
-            roughness = inputs.value("Diffuse Roughness")
-            given["diffuse_roughness"] = min(max(roughness, 0.0), 1.0)
-        tint = inputs.value("Specular Tint", (1.0, 1.0, 1.0))
+            bases = _roughnesses(inputs, "Diffuse Roughness")
+        varies = varying_of(inputs) == specular.TINT
+        tint = (1.0,) * 3 if varies else inputs.value("Specular Tint", (1.0, 1.0, 1.0))
         given["tint"] = tuple(max(c, 0.0) for c in tint)
-    if inputs.follows("Roughness"):
-        roughnesses = ROUGHNESSES
-    else:
-        roughnesses = (min(max(inputs.value("Roughness"), 0.0), 1.0),)
+    roughnesses = _roughnesses(inputs, "Roughness")
     stretches = (1.0,)
     if kind in ("glossy", "principled") and not is_mirror(roughnesses):
         stretches = _stretches(inputs, kind)
-    count = max(len(roughnesses), len(stretches))
-    pairs = ((roughnesses * count)[:count], (stretches * count)[:count])
-    return given, [{"roughness": r, "stretch": s} for r, s in zip(*pairs, strict=True)]
+    count = max(len(roughnesses), len(stretches), len(bases))
+    looks = {"roughness": roughnesses, "stretch": stretches, "diffuse_roughness": bases}
+    looks = {name: (values * count)[:count] for name, values in looks.items()}
+    return given, [{name: looks[name][i] for name in looks} for i in range(count)]
+
+
+def _roughnesses(inputs, name):
+    """The roughness of a socket, or several."""
+    return ROUGHNESSES if inputs.follows(name) else (min(max(inputs.value(name), 0.0), 1.0),)
+
+
+def is_plastic(inputs):
+    """Whether a Principled node is not metal all over."""
+    known = inputs.mean("Metallic")
+    return inputs.follows("Metallic") or known is None or known < 1
+
+
+def varying_of(inputs):
+    """The specular.Varying of a Principled node; None if it has none that has an effect. Raises
+    Refused if there are two."""
+    if not is_plastic(inputs):
+        return None
+    both = (specular.LEVEL, specular.TINT)
+    found = [v for v in both if v.socket in inputs and inputs.follows(v.socket)]
+    if len(found) > 1:
+        raise both_linked(*(v.socket for v in found))
+    return found[0] if found else None
+
+
+def both_linked(socket, other):
+    """The Refused for two links of which one model can't follow both."""
+    return Refused(
+        say(
+            "{socket} and {other} are linked, and only one of them can stay",
+            socket=Sentence(socket),
+            other=Sentence(other),
+        )
+    )
 
 
 def _f0_of(inputs):
-    """Reflectance of the interface of a Principled node at normal incidence."""
-    level, ior = inputs.value("Specular IOR Level"), inputs.value("IOR")
+    """Reflectance of the interface of a Principled node at normal incidence, at level 1 if the
+    level varies."""
+    level = 1.0 if varying_of(inputs) == specular.LEVEL else inputs.value("Specular IOR Level")
+    ior = inputs.value("IOR")
     if ior < 1:
         # As seen from within glass: beyond some angle everything is reflected.
         raise Refused(say("its {socket} is below 1", socket=Sentence("IOR")))

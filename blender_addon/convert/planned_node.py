@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..common.i18n import Sentence, in_percent, say
+from ..nearest import specular
 from ..packs import pack
 from ..trees import shader_values
 from .node_values import ANISOTROPY, KINDS
@@ -45,6 +46,14 @@ class Part:
     #: channel is the factor, and the model has the colour divided by it.
     scale: float = 1.0
     flat: str = ""
+    #: The socket that the widths and the polynomial of the rest follow.
+    rough: str = "Roughness"
+    #: How parameters follow an input that varies: {name: coefficients (r, g, b) of share^j}, as
+    #: specular.VaryingFit has them. The rest then is a polynomial in the largest share.
+    laws: dict = field(default_factory=dict)
+    varying: specular.Varying | None = None
+    #: A parameter that is the root of a linked colour, and the socket of that colour.
+    root: tuple = ()
 
     @property
     def label(self):
@@ -129,12 +138,14 @@ class Plan(Part):
         parts = [part for part in self.parts if part.model]
         found = {socket for part in parts for socket in part.links.values()}
         found |= {"Normal", "Tangent"} & set(self.node.inputs.keys())
-        if any(part.widths or part.again for part in parts) or self.rest and len(self.rest[0]) > 1:
-            found.add("Roughness")
+        found |= {part.rough for part in parts if part.widths}
+        if any(part.again for part in parts) or len(self.rest and self.rest[0]) > 1:
+            found.add(self.varying.socket if self.varying else "Roughness")
         if self.anisotropic:
             found |= set(ANISOTROPY[KINDS[self.node.bl_idname]])
         found |= {part.again[3] for part in parts if part.again}
         found |= {part.flat for part in parts if part.flat}
+        found |= {part.root[1] for part in parts if part.root}
         found |= {"Metallic"} if self.metal else set()
         found |= {"Alpha"} if self.transparent else set()
         return found | ({"Emission Color", "Emission Strength"} if self.glows else set())

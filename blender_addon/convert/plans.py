@@ -11,9 +11,17 @@ from .. import lamps
 from ..common import editable
 from ..common.i18n import Sentence, in_percent, say
 from ..groups import model_nodes
-from ..nearest import layer, native_bsdf
+from ..nearest import layer, native_bsdf, specular
 from ..nearest.native_bsdf import Native
-from ..nearest.nearest_model import base_of, candidates, matte_of, nearest, scale_of, with_width
+from ..nearest.nearest_model import (
+    base_of,
+    candidates,
+    matte_of,
+    mattes_of,
+    nearest,
+    scale_of,
+    with_width,
+)
 from ..packs import device, pack
 from ..packs.parameter_values import canonical
 from ..trees import animation, shader_trees
@@ -27,32 +35,35 @@ from .node_values import (
     STAYING,
     Inputs,
     Refused,
+    both_linked,
     check_off,
     color_of,
     effective_sockets,
     given_of,
     glows,
     is_transparent,
+    varying_of,
 )
 from .planned_node import Part, Plan
 from .seen_node import SeenNode
 
 #: The model of smooth glass.
 _CLEAR = "fresnel_dielectric"
-#: Glass is white if no channel of its colour is farther from 1. Two surfaces double this.
-_WHITE = 0.005
 
 
 def _plan_glass(material, node, inputs):
     inputs.setting("mute")
     inputs.check_unknown(KNOWN_SOCKETS["glass"])
-    color, roughness = inputs.value("Color"), inputs.value("Roughness")
-    if roughness > 1e-3:
+    if inputs.value("Roughness") > 1e-3:
         raise Refused(say("no model is of rough glass"))
     if inputs.value("Thin Film Thickness") != 0:
         raise Refused(say("it has {what}", what=Sentence("Thin Film")))
     # Blender's glass tints both reflected and transmitted light.
-    return _glass_of(material, node, inputs, "Color", [max(c, 0.0) for c in color])
+    tints = ("refracted", "reflected")
+    if inputs.follows("Color"):
+        return _glass_of(material, node, inputs, {}, dict.fromkeys(tints, "Color"))
+    color = tuple(max(c, 0.0) for c in inputs.constant("Color"))
+    return _glass_of(material, node, inputs, dict.fromkeys(tints, color), {})
 
 
 def _is_clear(inputs):
@@ -72,29 +83,24 @@ def _plan_clear(material, node, inputs):
         raise Refused(say("it has {what}", what=Sentence("Specular IOR Level")))
     if inputs.value("Specular Tint", (1.0, 1.0, 1.0)) != (1, 1, 1):
         raise Refused(say("it has {what}", what=Sentence("Specular Tint")))
-    # Such a node tints the transmitted light alone.
-    tint = [min(max(c, 0.0), 1.0) ** 0.5 for c in inputs.value("Base Color")]
+    # Such a node tints the transmitted light alone, at each surface by the root of its colour.
     more = {"glows": glows(inputs), "transparent": is_transparent(inputs)}
-    return _glass_of(material, node, inputs, "Base Color", tint, **more)
+    if inputs.follows("Base Color"):
+        more["root"] = ("refracted", "Base Color")
+        return _glass_of(material, node, inputs, {}, {}, **more)
+    tint = tuple(min(max(c, 0.0), 1.0) ** 0.5 for c in inputs.constant("Base Color"))
+    return _glass_of(material, node, inputs, {"refracted": tint}, {}, **more)
 
 
-def _glass_of(material, node, inputs, color, tint, **more):
-    """The Plan for smooth glass, which its socket `color` tints."""
+def _glass_of(material, node, inputs, tints, links, **more):
+    """The Plan for smooth glass. `tints`: values of the model's tints; `links`: those that a socket
+    of the node controls."""
     if _CLEAR not in pack.model_names():
         raise Refused(say("this extension lacks the models that are near: {models}", models=_CLEAR))
-    if any(abs(1 - c) > _WHITE for c in tint):
-        # Light passes two surfaces or more, and pictures of white glass show no colour at all: an
-        # error of one surface would be no warning.
-        said = say(
-            "its {socket} is not white, and {model} has no colour",
-            socket=Sentence(color),
-            model=pack.model(_CLEAR).label,
-        )
-        raise Refused(said)
-    values = {} if inputs.follows("IOR") else {"ior": inputs.constant("IOR")}
-    part = Part(_CLEAR, values, {"ior": "IOR"})
+    values = tints | ({} if inputs.follows("IOR") else {"ior": inputs.constant("IOR")})
+    part = Part(_CLEAR, values, {"ior": "IOR", **links})
     found = {"material": material, "node": node, "error": 0.0, "least_error": 0.0}
-    return Plan(**vars(part), **found, **more)
+    return Plan(**vars(part) | more, **found)
 
 
 def _check_ranges(parts):
@@ -148,10 +154,38 @@ def _widths(inputs, native, width, factor):
 
 
 def _follows_roughness(inputs, native):
-    """Whether a link or an animation controls the roughness of a node that is taken for `native`.
-    The base of a Principled node has another one, which is constant."""
+    """Whether a link or an animation controls the roughness of a node that is taken for
+    `native`."""
+    return inputs.reaches(_roughness_of(inputs, native))
+
+
+def _roughness_of(inputs, native):
+    """The socket of that roughness: the base of a Principled node has another one."""
     is_base = native.kind == "diffuse" and "Base Color" in inputs
-    return not is_base and inputs.reaches("Roughness")
+    return "Diffuse Roughness" if is_base else "Roughness"
+
+
+def _base_part(inputs, native, fit, values, color):
+    """The Part for the base beneath a layer, given the Fit to the base."""
+    width = fit.candidate.width
+    widths = tuple(_widths(inputs, matte_of(native), width, fit.factor)) if width else ()
+    links = dict.fromkeys(fit.candidate.links, color)
+    return Part(fit.candidate.model, values, links, widths, rough="Diffuse Roughness")
+
+
+def _varying_part(inputs, varying, natives, colors, has, color):
+    """The Part for a plastic one of whose specular inputs is linked, and its VaryingFit."""
+    native, others = natives[0], ("Roughness", "Diffuse Roughness", ANISOTROPY["principled"][0])
+    if len(natives) > 1:
+        raise both_linked(varying.socket, next(name for name in others if inputs.follows(name)))
+    candidate = next((c for c in candidates(native, has) if c.base), None)
+    fit = specular.fit(native, varying, candidate, colors, has) if candidate else None
+    if fit is None:
+        inputs.value(varying.socket)  # says that it is linked
+    values = with_width(fit.base.candidate, matte_of(native), fit.base.factor)
+    base = _base_part(inputs, native, fit.base, values, color)
+    laws = {"laws": fit.laws, "varying": varying}
+    return Part(specular.MODEL, fit.values, {}, (), base, fit.rest, **laws), fit
 
 
 def _part(inputs, native, fit, color):
@@ -164,8 +198,7 @@ def _part(inputs, native, fit, color):
     rough = _follows_roughness(inputs, native)
     base, below = None, base_of(candidate, native, rough)
     if below:
-        linked = {name: color for name in candidate.base.candidate.links}
-        base = Part(below.model, below.values, linked)
+        base = _base_part(inputs, native, candidate.base, below.values, color)
     again = ()
     if "again" in values and (rough or inputs.reaches(color)):
         slope, offset = (tuple(law.tolist()) for law in native_bsdf.facet_law(native))
@@ -177,7 +210,10 @@ def _part(inputs, native, fit, color):
     scale, flat = scale_of(candidate, native), ""
     if candidate.is_flat and inputs.reaches(color):
         links, flat = {}, color
-    return Part(candidate.model, values, links, widths, base, rest, again, scale, flat)
+    rough_socket = _roughness_of(inputs, native)
+    return Part(
+        candidate.model, values, links, widths, base, rest, again, scale, flat, rough_socket
+    )
 
 
 def _lacking(natives, colors):
@@ -228,21 +264,33 @@ def _plan_node(material, node, inputs):
     _, colors = inputs.colors(color)
 
     has = _shown(device.lacks_osl(lamps.current_scene()))
+    varying = varying_of(inputs) if given["kind"] == "principled" else None
 
     def looked(**other):
         """The Natives of the node with these values changed."""
         found = tuple(Native(**given | look | other) for look in looks)
         # Without a highlight, roughness and anisotropy of a Principled node have no effect.
-        is_base = found[0].is_matte and found[0].kind == "principled"
-        return (matte_of(found[0]),) if is_base else found
+        if found[0].is_matte and found[0].kind == "principled":
+            return mattes_of(found)
+        if found[0].metallic == 1:
+            found = tuple(replace(native, diffuse_roughness=0.0) for native in found)
+        return tuple(dict.fromkeys(found))
 
     def near(**other):
         """The Part for the node with these values changed, and its Fit."""
         natives = looked(**other)
+        if varying and natives[0].kind == "principled" and natives[0].metallic == 0:
+            return _varying_part(inputs, varying, natives, colors, has, color)
+        if varying == specular.TINT and natives[0].metallic > 0:
+            inputs.value(varying.socket)  # says that it is linked
         fit = nearest(natives, colors, inputs.reaches(color), has)
         if fit is None:
             raise Refused(_lacking(natives, colors))
-        return _part(inputs, natives[0], fit, color), fit
+        part = _part(inputs, natives[0], fit, color)
+        follows = part.base and part.base.widths or not any(natives[0].color)
+        if len({native.diffuse_roughness for native in natives}) > 1 and not follows:
+            inputs.value("Diffuse Roughness")  # says that it is linked
+        return part, fit
 
     def error_without(**other):
         """The error of one model for the node with these values changed."""
@@ -273,7 +321,7 @@ def _plan_node(material, node, inputs):
     if not inputs.follows("Metallic"):
         part, fit = near()
         is_pure = given["metallic"] in (0, 1)
-        if is_pure or not (fit.lost and inputs.follows(color)):
+        if is_pure or not varying and not (fit.lost and inputs.follows(color)):
             single = plan(part, [fit], [error for _, error in fit.found], **more)
         if is_pure:
             return single

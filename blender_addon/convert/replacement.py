@@ -37,7 +37,8 @@ class PreparedPart:
     @property
     def known(self):
         """The values, with None for linked parameters."""
-        linked = (*self.part.links, *(("f0", "tint") if self.part.flat else ()))
+        flat = ("f0", "tint") if self.part.flat else ()
+        linked = (*self.part.links, *flat, *self.part.laws, *self.part.root[:1])
         return self.values | dict.fromkeys(linked)
 
 
@@ -53,6 +54,8 @@ class Replacement:
         self._animated = animation.animated_properties(plan.node)
         #: The nodes whose output has the animation of a socket of the replaced node, by its name.
         self._moving = {}
+        #: The output of a Clamp node by socket, once it is made.
+        self._clamps = {}
         #: The tangent of an anisotropic node, once it is made.
         self._turned = None
         groups = [self._add(prepared) for prepared in parts]
@@ -159,22 +162,31 @@ class Replacement:
                 tree.links.new(source, present[name])
         if prepared.part.again:
             tree.links.new(self._again(prepared.part.again), present["again"])
+        if prepared.part.root:
+            name, color = prepared.part.root
+            tree.links.new(self._root(color), present[name])
         if prepared.part.flat:
             self._brightest = self._flat(prepared.part.flat, present)
+        for name, law in prepared.part.laws.items():
+            tree.links.new(self._followed(law, prepared.part.varying), present[name])
         for name, *law in prepared.part.widths:
-            tree.links.new(self._follow(*law), present[name])
+            tree.links.new(self._follow(prepared.part.rough, *law), present[name])
         return group
 
     def _joined(self, groups):
         """The shader that replaces the node: its models, and the node's effects that they lack."""
         plan, links = self._plan, self._tree.links
         shader, *others = (group.outputs["BSDF"] for group in groups)
-        if plan.flat or plan.scale != 1:
+        dims = plan.varying.dimmed if plan.varying else 0.0
+        if plan.flat or dims or plan.scale != 1:
             # An input without a link is black.
             dimmed = self._helper("ShaderNodeMixShader")
             dimmed.inputs[0].default_value = plan.scale
             if plan.flat:
                 links.new(self._brightest, dimmed.inputs[0])
+            if dims:
+                share = self._operation("ShaderNodeMath", "DIVIDE", self._share(), dims)
+                links.new(share, dimmed.inputs[0])
             links.new(shader, dimmed.inputs[2])
             shader = dimmed.outputs[0]
         if plan.base:
@@ -223,15 +235,43 @@ class Replacement:
                 source = bent.outputs["Normal"]
             self._tree.links.new(source, view.inputs["Normal"])
         rest = self._plan.rest
-        roughness = self._roughness() if len(rest[0]) > 1 else None
-        rows = [self._polynomial(row, roughness) for row in rest]
+        varies = len(rest[0]) > 1
+        of = (self._share if self._plan.varying else self._roughness)() if varies else None
+        rows = [self._polynomial(row, of) for row in rest]
         return self._polynomial(rows, view.outputs["Facing"])
 
     def _roughness(self):
         """The linked roughness between 0 and 1."""
-        clamped = self._helper("ShaderNodeClamp")
-        self._tree.links.new(self._source("Roughness"), clamped.inputs["Value"])
-        return clamped.outputs[0]
+        return self._clamped("Roughness")
+
+    def _share(self):
+        """The largest channel of the input of Plan.varying, between 0 and 1."""
+        return self._clamped(self._plan.varying.socket)
+
+    def _clamped(self, name):
+        if name not in self._clamps:
+            source = self._source(name)
+            if self._node.inputs[name].type == "RGBA":
+                channels = self._helper("ShaderNodeSeparateColor")
+                self._tree.links.new(source, channels.inputs[0])
+                red, green, blue = channels.outputs
+                source = self._operation("ShaderNodeMath", "MAXIMUM", red, green)
+                source = self._operation("ShaderNodeMath", "MAXIMUM", source, blue)
+            clamped = self._helper("ShaderNodeClamp")
+            self._tree.links.new(source, clamped.inputs["Value"])
+            self._clamps[name] = clamped.outputs[0]
+        return self._clamps[name]
+
+    def _followed(self, law, varying):
+        """Nodes for a row of Part.laws."""
+        of = self._source(varying.socket)
+        of = self._operation("ShaderNodeVectorMath", "MAXIMUM", of, varying.dimmed)
+        of = self._operation("ShaderNodeVectorMath", "MINIMUM", of, 1.0)
+        found = law[-1]
+        for c in reversed(law[:-1]):
+            found = self._operation("ShaderNodeVectorMath", "MULTIPLY_ADD", found, of, c)
+        found = self._operation("ShaderNodeVectorMath", "MAXIMUM", found, 0.0)
+        return self._operation("ShaderNodeVectorMath", "MINIMUM", found, 1.0)
 
     def _polynomial(self, coefficients, of):
         """Nodes for Horner's rule. Coefficients are numbers or outputs of nodes."""
@@ -267,6 +307,15 @@ class Replacement:
         lost = self._operation("ShaderNodeMath", "SUBTRACT", mean, 1.0)
         left = vector("MULTIPLY_ADD", average, lost, 1.0)
         return vector("DIVIDE", vector("MULTIPLY", average, mean), left)
+
+    def _root(self, color):
+        """Nodes for the root of a linked colour, each channel of which is held between 0 and 1."""
+        held = self._operation("ShaderNodeVectorMath", "MAXIMUM", self._source(color), 0.0)
+        held = self._operation("ShaderNodeVectorMath", "MINIMUM", held, 1.0)
+        root = self._helper("ShaderNodeGamma")
+        root.inputs["Gamma"].default_value = 0.5
+        self._tree.links.new(held, root.inputs["Color"])
+        return root.outputs[0]
 
     def _flat(self, color, present):
         """Nodes for the values of a model that reflects a linked colour at all angles. Returns the
@@ -308,11 +357,11 @@ class Replacement:
         if name in self._direct:
             self._given[name] = socket
 
-    def _follow(self, factor, power, low, high, stretched):
-        """Nodes for a row of Part.widths."""
+    def _follow(self, rough, factor, power, low, high, stretched):
+        """Nodes for a row of Part.widths. `rough`: the socket that they follow."""
         found = None
         if power:
-            found = self._math("MAXIMUM", self._source("Roughness"), 1e-3)
+            found = self._math("MAXIMUM", self._source(rough), 1e-3)
             found = self._math("POWER", found, power)
         if stretched:
             ratio = self._math("MULTIPLY_ADD", self._source(self._sockets[0]), RATIO, 1.0)

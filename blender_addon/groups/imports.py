@@ -10,6 +10,7 @@ from bpy.app.handlers import persistent
 
 from .. import lamps
 from ..common import app_handlers
+from ..content import part_groups
 from . import automatic, model_nodes, nodes
 
 
@@ -30,6 +31,10 @@ def _imported_groups(context):
 @persistent
 def _after_import(context):
     imported = _imported_groups(context)
+    # Each further append examines all that the file has, many times.
+    known = {group.session_uid for group in imported if not part_groups.is_part(group)}
+    part_groups.merge_copies(imported)
+    imported = [group for group in bpy.data.node_groups if group.session_uid in known]
     groups = [group for group in imported if model_nodes.TAG in group]
     known = {group.session_uid for group in groups}
     if groups or any(lamps.is_group(group) for group in imported):

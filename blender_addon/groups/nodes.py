@@ -350,10 +350,10 @@ def remove_group(group):
 def _clear_away(uids, texts):
     """Removes the parts of a group from the file if nothing else uses them: the groups with these
     session_uids, and the texts."""
-    trees = [*bpy.data.node_groups, *(m.node_tree for m in bpy.data.materials if m.node_tree)]
-    used = {getattr(node, "script", None) for tree in trees for node in tree.nodes}
-    for text in {*texts, *stand_in.texts()}:
-        if text not in used:
+    if candidates := {*texts, *stand_in.texts()}:
+        trees = [*bpy.data.node_groups, *(m.node_tree for m in bpy.data.materials if m.node_tree)]
+        used = {getattr(node, "script", None) for tree in trees for node in tree.nodes}
+        for text in candidates - used:
             bpy.data.texts.remove(text)
     # Removing a group may leave further ones without a user.
     while unused := [g for g in bpy.data.node_groups if g.session_uid in uids and g.users == 0]:

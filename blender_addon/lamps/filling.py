@@ -224,7 +224,7 @@ def last_found(scene, group=None):
     if group is None:
         return _listed(survey, _arranged(worth[: budget_of_file().lamps()], []))
     there = [slots.decoded(numbers) for numbers in _by_slot(shared_group.written(group))]
-    chosen = [c for c in worth if any(shared_group.all_same(c.values, slot) for slot in there)]
+    chosen = [c for c in worth if any(slots.is_same_lamp(c.values, slot) for slot in there)]
     return _listed(survey, chosen, slots.elsewhere(group.library))
 
 

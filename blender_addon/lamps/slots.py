@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import bpy
 import numpy as np
-from mathutils import Matrix, Vector
+from mathutils import Matrix, Quaternion, Vector
 
 from ..common.i18n import say
 
@@ -233,6 +233,49 @@ def decoded(values):
     """coded() undone."""
     code = _code_of(values[_SHAPE])
     return coded(values, 1 - code, 0) if code else values
+
+
+def _now(value):
+    """What a number of a slot is at the moment."""
+    if not isinstance(value, Driven):
+        return value
+    if not value.is_channel:
+        found = value.of.path_resolve(value.path)
+    else:
+        channel, axis = value.path.split("_")
+        matrix = value.of.matrix_world
+        parts = dict(zip(("LOC", "ROT", "SCALE"), matrix.decompose(), strict=True))
+        found = getattr(parts[channel], axis.lower())
+    return found * value.factor + value.added
+
+
+def _as_seen(values):
+    """What shaders read of a slot, given its numbers without a code: equal for lamps of equal shape
+    at one place, whatever objects they are."""
+    found = np.array([_now(value) for value in values], float)
+    place, (x, y, z), scale, shape = found.reshape(4, 3)
+    turn = np.array(Quaternion((scale[2], x, y, z)).to_matrix())
+    kind = int(shape[0] + 0.5)
+    if kind == SKY_SUN:
+        return np.concatenate([(x, y), shape])
+    if kind == SUN:
+        return np.concatenate([turn[:, 2], shape[:2]])
+    if kind == BALL:
+        # A ball without a cone looks the same however it is turned.
+        axis = turn[:, 2] if shape[2] > 0 or scale[1] > 0 else np.zeros(3)
+        return np.concatenate([place, axis, [scale[1] > 0], shape])
+    # The sides of a flat lamp have no direction.
+    sides = np.abs([shape[1] * scale[0], shape[2] * scale[1]])
+    return np.concatenate([place, turn[:, 2], np.abs(turn[:, 0]), sides, [shape[0], shape[1] < 0]])
+
+
+def is_same_lamp(a, b):
+    """Whether the numbers of two slots are of lamps that look the same: of the same object, or of
+    another one at the same place."""
+    if None in a or None in b:
+        return False
+    one, other = _as_seen(a), _as_seen(b)
+    return one.shape == other.shape and np.allclose(one, other, rtol=1e-4, atol=1e-4)
 
 
 def turned(direction):

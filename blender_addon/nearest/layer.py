@@ -42,6 +42,26 @@ def rest(f0, tint, multiscatter, roughness=None):
     return tuple(tuple(float(c) for c in row) for row in rows)
 
 
+#: Degree in a share that varies.
+_DEGREE_SHARE = 4
+
+
+@functools.lru_cache(maxsize=64)
+def rest_of_share(native, at, least):
+    """The same for at(native, share), where the share varies from 0 to 1: coefficients of
+    (1 - cos)^i share^j. `least`: the lowest share but 0 to which it is fitted."""
+    shares = np.concatenate([[0.0], np.linspace(least, 1, 12)])
+    views = np.stack([np.sqrt(1 - _COSINES**2), 0 * _COSINES, _COSINES], -1)
+    nodes = [at(replace(native, color=(1.0, 1.0, 1.0)), share) for share in shares]
+    left = 1 - np.stack([native_bsdf.view_terms(node, views).taken for node in nodes])
+    of_view = (1 - _COSINES)[:, None] ** np.arange(_DEGREE + 1)
+    of_share = shares[:, None] ** np.arange(_DEGREE_SHARE + 1)
+    terms = (of_view[None, :, :, None] * of_share[:, None, None, :]).reshape(left.size, -1)
+    weight = 1 / (left.ravel() + 0.1)
+    found = np.linalg.lstsq(terms * weight[:, None], left.ravel() * weight, rcond=None)[0]
+    return tuple(tuple(float(c) for c in row) for row in found.reshape(_DEGREE + 1, -1))
+
+
 @functools.cache
 def mean_albedo():
     """The cosine-weighted mean albedo of GGX microfacets that reflect everything: coefficients of

@@ -218,9 +218,15 @@ def _polished(links, sharp=False):
     )
 
 
-def _layered(native, has):
-    """A glossy layer of microfacets over the nearest matte base."""
-    base = nearest((matte_of(native),), (), False, has)
+def mattes_of(natives):
+    """The distinct bases of Principled nodes."""
+    return tuple(dict.fromkeys(map(matte_of, natives)))
+
+
+def _layered(natives, has):
+    """A glossy layer of microfacets over the nearest matte base. `natives`: nodes that differ only
+    in roughnesses and stretch."""
+    native, base = natives[0], nearest(mattes_of(natives), (), False, has)
     if base is None:
         return ()
     f0, tint = zip(*(layer.schlick_like(native.f0, t) for t in native.tint), strict=True)
@@ -232,13 +238,15 @@ def _layered(native, has):
     return (Candidate("microfacet", layer_of, _FACETS, base=base, is_own=True),)
 
 
-def candidates(native, has=lambda model, values: True):
-    """The candidates for a node, among the models and values for which has(model, values) is true.
-    A model without a highlight is no candidate for a node that has one, however weak."""
-    return tuple(c for c in _candidates(native, has) if has(c.model, c.values(native)))
+def candidates(native, has=lambda model, values: True, natives=()):
+    """The candidates for a node, or for `natives` of which it is the first, among the models and
+    values for which has(model, values) is true. A model without a highlight is no candidate for a
+    node that has one, however weak."""
+    found = _candidates(native, has, natives or (native,))
+    return tuple(c for c in found if has(c.model, c.values(native)))
 
 
-def _candidates(native, has):
+def _candidates(native, has, natives):
     if native.is_matte:
         return _MATTE
     if native.is_mirror and native.kind == "glossy":
@@ -255,7 +263,7 @@ def _candidates(native, has):
     if native.metallic == 1:
         return (*_COLORED, *_polished({"rs": "Color"}))
     if native.metallic == 0:
-        return (*_polished({"rd": "Color"}), *_layered(native, has))
+        return (*_polished({"rd": "Color"}), *_layered(natives, has))
     return _polished({})
 
 
@@ -288,8 +296,8 @@ class Fit:
 
 @functools.lru_cache(maxsize=256)
 def nearest(natives, colors, colored, has):
-    """The Fit to a tuple of nodes that differ only in roughness and stretch; None if no model comes
-    near.
+    """The Fit to a tuple of nodes that differ only in roughnesses and stretch; None if no model
+    comes near.
 
     Considers the models and values for which has(model, values) is true. The Fit includes the
     errors for nodes of other colours, `colors`. `colored`: whether the node's colour is linked; a
@@ -301,7 +309,7 @@ def nearest(natives, colors, colored, has):
         errors = (known.get(c) or _light_and_error(candidate, targets, factor, c) for c in colors)
         return Fit(candidate, factor, tuple(errors), lost)
 
-    considered = candidates(native, has)
+    considered = candidates(native, has, natives)
     for candidate in considered:
         if candidate.is_own and (candidate.is_colored or not colored):
             factor = candidate.width.usual if candidate.width else 1.0

@@ -224,7 +224,12 @@ def _substances(locale):
     known = api.substances().values()
     metals, others = ([s for s in known if s.conductor is kind] for kind in (True, False))
     rows = [(s.name, s.label, s.source) for s in (*metals, *others)]
-    about = tip(say("Measurements as refractiveindex.info exports them: wl,n and wl,k"))
+    about = tip(
+        say(
+            "Measurements of refractiveindex.info: a table of wl,n and "
+            "wl,k, or a YAML file of its database"
+        )
+    )
     return [*rows, (_FILE, iface(say("From File\u2026")), about)]
 
 
@@ -254,11 +259,14 @@ class BRDFC_OT_substance(ChangesActiveMaterial, Operator):
     )
     filepath: StringProperty(
         name="File",
-        description="Measurements as refractiveindex.info exports them: wl,n and wl,k",
+        description=(
+            "Measurements of refractiveindex.info: a table of wl,n and "
+            "wl,k, or a YAML file of its database"
+        ),
         subtype="FILE_PATH",
         options={"SKIP_SAVE"},
     )
-    filter_glob: StringProperty(default="*.csv;*.txt", options={"HIDDEN"})
+    filter_glob: StringProperty(default="*.csv;*.txt;*.yml;*.yaml", options={"HIDDEN"})
 
     def invoke(self, context, event):
         if self.substance != _FILE:
@@ -271,7 +279,9 @@ class BRDFC_OT_substance(ChangesActiveMaterial, Operator):
         name = bpy.path.abspath(self.filepath) if self.substance == _FILE else self.substance
         try:
             if self.substance == _FILE and not name.lower().endswith(optical.ENDINGS):
-                expected = say("{file}: expected a file NAME.csv or NAME.txt", file=repr(name))
+                expected = say(
+                    "{file}: expected a file NAME.csv, NAME.txt or NAME.yml", file=repr(name)
+                )
                 raise ValueError(expected)
             node = model_nodes.named(material, self.node) if self.node else None
             stated = self.properties.is_property_set("thickness")

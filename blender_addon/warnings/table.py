@@ -296,9 +296,10 @@ DECLARED = (
     Row(
         "normal_pass",
         WARNING,
-        "Denoising may blur details of this material; without it the picture is right",
+        "The pass Denoising Normal of this material is noisy: denoising with it may blur details; "
+        "the picture itself is right",
         setting_rules.normal_pass,
-        more="The normals that the denoiser is given of it are noisy: Albedo alone is better",
+        more="Link Denoising Albedo alone to the Denoise node: it then keeps more details",
     ),
     Row(
         "leaning_facets",

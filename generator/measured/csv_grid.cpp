@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 
 #include "core/csv.h"
 #include "core/error.h"
+#include "core/text_file.h"
 #include "measured/angle_rows.h"
 #include "measured/binary_file.h"
 
@@ -24,8 +27,8 @@ const std::vector<std::string>& names_of(Columns columns) {
 }
 
 /// What the first column of a table of its kind says; angles where there is none.
-Columns columns_of(const std::string& file) {
-  std::ifstream in(file);
+Columns columns_of(const std::string& text) {
+  std::istringstream in(text);
   std::string line;
   while (trim(line).empty() && std::getline(in, line)) {
   }
@@ -51,8 +54,10 @@ bool look_like_radians(const AngleRows& rows) {
 
 Measurement read_csv_grid(const std::filesystem::path& path) {
   const std::string name = path.string();
-  std::ifstream in = open_file(path);
-  const Columns kind = columns_of(name);
+  std::ifstream file = open_file(path);
+  const std::string text = plain_text({std::istreambuf_iterator<char>(file), {}}, name);
+  const Columns kind = columns_of(text);
+  std::istringstream in(text);
   const bool vectors = kind == Columns::Vectors;
   const std::vector<std::string>& columns = names_of(kind);
   CsvReader csv(in, name, columns);

@@ -2,23 +2,17 @@
 #include "model/optical.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
-#include <fstream>
 #include <limits>
 
-#include "core/csv.h"
 #include "core/data_dir.h"
-#include "core/parse.h"
+#include "model/optical_file.h"
 
 namespace brdfc::inline model {
 namespace fs = std::filesystem;
 namespace {
 
-struct Row {
-  double wavelength, value;
-  int line;
-};
+using Row = OpticalRow;
 
 /// Checks and cleans the rows of a file before they become a curve, and collects notes about that.
 class Cleaner {
@@ -110,17 +104,6 @@ class Cleaner {
   std::vector<std::string>& notes_;
 };
 
-/// A line of the two kinds that refractiveindex.info exports: fields are separated by commas or by tabs.
-std::string with_commas(std::string line) {
-  if (line.find(',') == std::string::npos) std::ranges::replace(line, '\t', ',');
-  return line;
-}
-
-bool is_file(std::string name) {
-  std::ranges::transform(name, name.begin(), [](unsigned char c) { return char(std::tolower(c)); });
-  return name.ends_with(".csv") || name.ends_with(".txt");
-}
-
 }  // namespace
 
 double Curve::at(double wavelength) const {
@@ -158,52 +141,13 @@ Xyz Substance::transmittance(double metres) const {
 
 Substance read_substance(const fs::path& path) {
   const std::string file = path.string();
-  std::ifstream in(path);
-  std::error_code ignored;
-  if (!in || fs::is_directory(path, ignored)) input_error("{}: cannot be read", file);
-  Substance out{file, path.stem().string(), "", {}, {}, {}};
-  std::vector<Row> rows_of_n, rows_of_k;
-  std::vector<char> block;  // the columns beside wl
-  int number = 0, comments = 0;
-  for (std::string text; std::getline(in, text);) {
-    if (++number == 1 && text.starts_with("\xef\xbb\xbf")) text.erase(0, 3);
-    const std::string line = trim(text), where = fmt::format("{} line {}", file, number);
-    if (line.empty()) continue;
-    if (line[0] == '#') {
-      ++comments;
-      if (comments == 1) out.label = trim(line.substr(1));
-      if (comments == 2) out.source = trim(line.substr(1));
-      continue;
-    }
-    const std::vector<std::string> fields = split_fields(with_commas(line));
-    if (fields[0] == "wl") {
-      block.clear();
-      for (std::size_t i = 1; i < fields.size(); ++i) {
-        if (fields[i] != "n" && fields[i] != "k") break;
-        const char letter = fields[i][0];
-        if (!(letter == 'n' ? rows_of_n : rows_of_k).empty() || std::count(block.begin(), block.end(), letter))
-          input_error("{}: expected {} once", where, letter);
-        block.push_back(letter);
-      }
-      if (block.empty() || block.size() + 1 != fields.size()) block.clear();
-    }
-    if (block.empty()) input_error("{}: expected the header wl,n or wl,k or wl,n,k, got '{}'", where, line);
-    if (fields[0] == "wl") continue;
-    std::vector<double> row;
-    for (const std::string& f : fields)
-      if (const auto value = parse(f); value && std::isfinite(*value)) row.push_back(*value);
-    if (row.size() != fields.size() || row.size() != block.size() + 1)
-      input_error("{}: expected {} numbers, a wavelength in \xc2\xb5m and {}, got '{}'", where, block.size() + 1,
-                  fmt::join(block, " and "), line);
-    for (std::size_t i = 0; i < block.size(); ++i)
-      (block[i] == 'n' ? rows_of_n : rows_of_k).push_back({row[0], row[i + 1], number});
-  }
-  if (rows_of_n.empty()) input_error("{}: expected a line wl,n and rows below it, found no n", file);
+  OpticalFile found = read_optical_file(path);
+  Substance out{file, found.label.empty() ? path.stem().string() : found.label, found.source, {}, {}, {}};
   Cleaner cleaner(file, out.notes);
-  const bool nanometres = cleaner.in_nanometres(rows_of_n, rows_of_k);
-  out.n = cleaner.curve(std::move(rows_of_n), 'n', nanometres);
+  const bool nanometres = cleaner.in_nanometres(found.n, found.k);
+  out.n = cleaner.curve(std::move(found.n), 'n', nanometres);
   if (out.n.nm.empty()) input_error("{}: expected n in the visible, found none", file);
-  out.k = cleaner.curve(std::move(rows_of_k), 'k', nanometres);
+  out.k = cleaner.curve(std::move(found.k), 'k', nanometres);
   return out;
 }
 
@@ -222,13 +166,13 @@ const std::vector<Substance>& substances() {
 }
 
 Substance find_substance(const std::string& name, const fs::path& folder) {
-  if (is_file(name)) return read_substance(folder / name);  // an absolute path is not changed
+  if (is_optical_file(name)) return read_substance(folder / name);  // an absolute path is not changed
   std::vector<std::string> known;
   for (const Substance& s : substances()) {
     if (s.name == name) return s;
     known.push_back(s.name);
   }
-  input_error("expected a file NAME.csv or NAME.txt, or one of {}, got '{}'", fmt::join(known, ", "), name);
+  input_error("expected a file NAME.csv, NAME.txt or NAME.yml, or one of {}, got '{}'", fmt::join(known, ", "), name);
 }
 
 OpticalValues optical_values(const Substance& s, const ToRgb& to_rgb) {

@@ -92,14 +92,14 @@ struct Substance {
 /// Reads a file in the export format of refractiveindex.info: a line wl,n, rows with a wavelength in micrometres and n,
 /// then optionally the same for wl,k; or wl,n,k. Lines that start with # are skipped; the first of them is the label,
 /// the second the source. Wavelengths of 100 and more are nanometres. Rows may be in any order; for a wavelength that
-/// occurs twice the mean is used. Assumptions are listed in Substance::notes. Throws InputError naming file, line and
-/// what was expected.
+/// occurs twice the mean is used. Or a file of that site's database, YAML. Assumptions are listed in Substance::notes.
+/// Throws InputError naming file, line and what was expected.
 Substance read_substance(const std::filesystem::path&);
 
 /// The substances of data/optical, by name.
 const std::vector<Substance>& substances();
-/// One of these substances; or one read from a file if the name ends with .csv or .txt, where a relative path is
-/// relative to `folder`. Throws InputError that lists the names, or as read_substance() does.
+/// One of these substances; or one read from a file if the name ends with .csv, .txt, .yml or .yaml, where a relative
+/// path is relative to `folder`. Throws InputError that lists the names, or as read_substance() does.
 Substance find_substance(const std::string& name, const std::filesystem::path& folder);
 
 /// Converts X, Y and Z to the working space.

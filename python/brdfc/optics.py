@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from . import _optics
 from ._formula import NUMPY
 from ._model import real
+from ._optical_file import read_file
 
 #: Metres after which absorption is exact where none are stated, and their range.
 THICKNESS, THICKNESSES = _optics.THICKNESS, _optics.THICKNESSES
@@ -163,14 +164,6 @@ def substance(name: str) -> Substance:
     return known[name]
 
 
-def _number(text):
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
-
-
 def _counted(count, one, several):
     return one if count == 1 else several.format(count)
 
@@ -253,59 +246,22 @@ class _Cleaner:
         return curve
 
 
-def _header(fields, found, where):
-    """The columns beside wl, none if that is no header."""
-    block = fields[1:]
-    if not block or any(f not in found for f in block):
-        return []
-    for at, letter in enumerate(block):
-        if found[letter] or letter in block[:at]:
-            raise ValueError(f"{where}: expected {letter} once")
-    return block
-
-
 def read(path: str | PathLike[str]) -> Substance:
     """Reads a file as refractiveindex.info exports it: a line wl,n, rows of a wavelength in
     micrometres and n, then the same of wl,k, which may be missing; or wl,n,k; with commas or tabs.
     Lines that start with # are skipped; the first is the label, the second the source. Wavelengths
     of 100 and more are nanometres; rows may come in any order, and of a wavelength that stands
-    twice the mean is taken. What was assumed is said in `notes`.
+    twice the mean is taken. Or a file of that site's database (YAML) with tables, or with the
+    formulas 1, 2, 3, 5 and 6. Text is UTF-8, or UTF-16 with a byte-order mark. What was assumed is
+    said in `notes`.
 
     Raises OSError, and ValueError naming file, line and what was expected.
     """
     path = Path(path)
-    text = path.read_text(encoding="utf-8-sig", errors="replace")
-    comments, block = [], []
-    found: dict[str, list[tuple[float, float, int]]] = {"n": [], "k": []}
-    for number, line in enumerate(text.split("\n"), 1):
-        line, where = line.strip(" \t\r"), f"{path} line {number}"
-        if not line:
-            continue
-        if line.startswith("#"):
-            comments.append(line[1:].strip(" \t\r"))
-            continue
-        separator = "," if "," in line else "\t"
-        fields = [f.strip(' \t\r"') for f in line.split(separator)]
-        if fields[0] == "wl":
-            block = _header(fields, found, where)
-        if not block:
-            raise ValueError(f"{where}: expected the header wl,n or wl,k or wl,n,k, got '{line}'")
-        if fields[0] == "wl":
-            continue
-        row = [_number(f) for f in fields]
-        if None in row or len(row) != len(block) + 1:
-            raise ValueError(
-                f"{where}: expected {len(block) + 1} numbers, a wavelength in µm and "
-                f"{' and '.join(block)}, got '{line}'"
-            )
-        for letter, value in zip(block, row[1:], strict=True):
-            found[letter].append((row[0], value, number))
-    if not found["n"]:
-        raise ValueError(f"{path}: expected a line wl,n and rows below it, found no n")
+    label, source, found = read_file(path)
     cleaner = _Cleaner(path)
     nanometres = cleaner.in_nanometres(found["n"] + found["k"])
     curves = [cleaner.curve(rows, letter, nanometres) for letter, rows in found.items()]
     if not curves[0].nm:
         raise ValueError(f"{path}: expected n in the visible, found none")
-    label, source = [*comments, "", ""][:2]
     return Substance(str(path), label or path.stem, source, *curves, tuple(cleaner.notes))

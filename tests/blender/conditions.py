@@ -58,9 +58,9 @@ class Form:
 NATIVE = DIFFUSE, GLOSSY = Form("Diffuse", "node"), Form("Glossy", "node")
 
 
-def representatives(extension, listed):
-    """Forms that represent all others, by what they consist of. `listed`: from `brdfc list
-    --json`."""
+def representatives(extension, listed, nodes=False):
+    """Forms that represent all others, by what they consist of; or Formula Nodes, which are made
+    otherwise (docs/nodes.md has what was found). `listed`: from `brdfc list --json`."""
     models = {m["name"]: m for m in listed}
     forms = {}
 
@@ -81,6 +81,11 @@ def representatives(extension, listed):
             model = sorted(fitting)[0]
             forms[name] = Form(model, form, models[model]["mirror"])
 
+    if nodes:
+        # Bases: microfacets, none, cones, microfacets and Diffuse.
+        for model in ("cook_torrance", "radziszewski_alda", "coupled", "schlick"):
+            pick(f"nodes, {model}", "nodes", lambda m, e, model=model: m["name"] == model)
+        return list(forms.values())
     pick("closures and a mirror", "exact", lambda m, e: m["mirror"] and e["auto"] == "exact")
     pick("closures alone", "exact", lambda m, e: not m["mirror"])
     pick("closures with a ramp", "exact", lambda m, e: not m["mirror"] and has_ramp(e))

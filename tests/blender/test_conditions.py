@@ -4,7 +4,7 @@
 If a condition biases a form, the panel must say so. With BRDFC_CONDITIONS=all, every condition is
 measured, and the rows go to conditions/<version>.json beside the tool, from which
 evidence/conditions makes its table; otherwise only a few. BRDFC_CONDITIONS_FORM=aimed measures
-only that form.
+only that form; Formula Nodes are measured only if it is `nodes`.
 """
 
 import json
@@ -24,7 +24,9 @@ pytestmark = pytest.mark.full
 
 @pytest.fixture(scope="module")
 def forms(extension, tool):
-    every = conditions.representatives(extension, json.loads(tool("list", "--json")))
+    every = conditions.representatives(
+        extension, json.loads(tool("list", "--json")), nodes=ONLY == "nodes"
+    )
     every = [f for f in every if ONLY in (None, f.form)]
     assert every, f"BRDFC_CONDITIONS_FORM: there is no form {ONLY}"
     return every

@@ -163,10 +163,12 @@ def test_constants_have_to_agree_in_all_materials(extension, convert):
     plan = only(convert.plan([car]))
     assert plan.metal and plan.unused == ("IOR", "Coat Weight")
     group.inputs["IOR"].default_value = 1.6
-    assert only(convert.plan([car])).refusal == "IOR is linked"
+    assert only(convert.plan([car])).refusal == "IOR is linked, and converts only as one value"
     group.inputs["IOR"].default_value = 1.5
     group.inputs["Coat Weight"].default_value = 0.5
-    assert only(convert.plan([car])).refusal == "Coat Weight is linked"
+    assert (
+        only(convert.plan([car])).refusal == "Coat Weight is linked, and converts only as one value"
+    )
     # A second node of the same material counts as well; what nothing shows does not.
     bike.node_tree.links.clear()
     assert not only(convert.plan([car])).refusal

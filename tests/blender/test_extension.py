@@ -1633,7 +1633,11 @@ def test_disable_leaves_nothing_behind(extension, empty):
 @pytest.mark.parametrize(
     "way", ["new_material", "set_parameters", "see_lamps", "warnings", "prepare_material"]
 )
-def test_a_script_that_imports_a_disabled_extension_enables_it(extension, empty, way, capfd):
+def test_a_script_that_imports_a_disabled_extension_enables_it(
+    extension, empty, way, capfd, monkeypatch
+):
+    enabling = import_module(f"{extension.package}.common.enabling")
+    monkeypatch.setattr(enabling, "_said", False)
     # Without handlers, a lamp that moves would stay where it was in every material.
     material = extension.api.new_material("ward")
     bpy.ops.preferences.addon_disable(module=extension.package)
@@ -1650,6 +1654,21 @@ def test_a_script_that_imports_a_disabled_extension_enables_it(extension, empty,
         assert "enabled for this session" in capfd.readouterr().out
         extension.api.new_material("phong")
         assert "enabled" not in capfd.readouterr().out
+    finally:
+        bpy.ops.preferences.addon_enable(module=extension.package)
+
+
+def test_it_is_said_once_that_a_script_enables_the_extension(extension, empty, capfd, monkeypatch):
+    """wm.read_factory_settings disables it each time, as its preferences name no extension."""
+    enabling = import_module(f"{extension.package}.common.enabling")
+    monkeypatch.setattr(enabling, "_said", False)
+    try:
+        for _ in range(3):
+            bpy.ops.preferences.addon_disable(module=extension.package)
+            assert not hasattr(bpy.types, "BRDFC_OT_add_node")
+            extension.api.new_material("phong")
+            assert hasattr(bpy.types, "BRDFC_OT_add_node")
+        assert capfd.readouterr().out.count("enabled for this session") == 1
     finally:
         bpy.ops.preferences.addon_enable(module=extension.package)
 

@@ -327,6 +327,47 @@ def test_linked_materials_aim_at_their_own_files_lamps(extension, empty, tmp_pat
     assert light_of(scene) > 0
 
 
+LIKE = {
+    "point": ("POINT", {"location": (5, 0, 5), "energy": 100, "shadow_soft_size": 0.1}),
+    "spot": ("SPOT", {"location": (0, 0, 6), "energy": 100, "shadow_soft_size": 0.1}),
+    "sun": ("SUN", {"location": (0, 0, 6), "energy": 1, "angle": 0.03}),
+    "area": ("AREA", {"location": (0, 0, 6), "energy": 100, "size": 0.3}),
+}
+
+
+@pytest.mark.parametrize("kind", LIKE)
+def test_a_lamp_like_that_of_the_linked_file_is_none_to_warn_of(extension, empty, tmp_path, kind):
+    """Materials aim at places, so it does not matter that the lamp is another object."""
+    kind, inputs = LIKE[kind]
+    material = ball(extension, empty)
+    add_lamp(empty, kind, name="There", **inputs)
+    bpy.context.view_layer.update()
+    path = tmp_path / "library.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    name = material.name
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene = bpy.context.scene
+    extension.scene_loader.apply_clean_settings(scene, max_bounces=0)
+    extension.api.enable_osl(scene)
+    with bpy.data.libraries.load(str(path), link=True) as (_, to):
+        to.materials = [name]
+    (material,) = to.materials
+    bpy.context.view_layer.objects.active = helpers.add_sphere(scene, material)
+    here = add_lamp(scene, kind, name="Here", **inputs)
+    bpy.context.view_layer.update()
+    assert "linked_lamps" not in found(extension, material, scene)
+    # Elsewhere it is one. A sun is the same wherever it stands.
+    if kind == "SUN":
+        here.location = (1, 2, 3)
+        bpy.context.view_layer.update()
+        assert "linked_lamps" not in found(extension, material, scene)
+        here.rotation_euler = (0.5, 0, 0)
+    else:
+        here.location.x -= 2
+    bpy.context.view_layer.update()
+    assert "Here" in found(extension, material, scene)["linked_lamps"]
+
+
 # ---- physics that a lamp's settings bring out ----------------------------------------------------
 
 

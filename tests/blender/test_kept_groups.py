@@ -105,6 +105,33 @@ def test_what_materials_add_to_a_file(extension, empty, tmp_path):
     assert again < 5e3 and ward < 250e3 and first < 650e3 and factors < 800e3
 
 
+def test_parts_that_an_append_brings_again_are_merged(extension, empty, tmp_path):
+    """Materials that are appended one by one share what their models have in common. Blender's own
+    time for each append grows with the groups in the file."""
+    parts = import_module(f"{extension.package}.content.part_groups")
+    models = ("ward", "blinn", "microfacet")
+    empty.cycles.shading_system = False
+    for model in models:
+        material = extension.api.new_material(model)
+        material.name, material.use_fake_user = model, True
+    path = tmp_path / "library.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+
+    def digests():
+        return sorted(g[parts.PART] for g in bpy.data.node_groups if parts.is_part(g))
+
+    there = digests()
+    shown = {m: described(bpy.data.materials[m].node_tree) for m in models}
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    bpy.context.scene.render.engine = "CYCLES"
+    for model in (*models, "ward"):
+        folder = f"{path}/Material/"
+        assert bpy.ops.wm.append(directory=folder, filename=model) == {"FINISHED"}
+    assert digests() == there and len(set(there)) == len(there) > 20
+    for model in models:
+        assert described(bpy.data.materials[model].node_tree) == shown[model]
+
+
 def test_the_cursor_shows_that_nodes_are_built(extension, kept, monkeypatch):
     part_groups = import_module(f"{extension.package}.content.part_groups")
     shown, cursor = [], part_groups._wait_cursor

@@ -122,12 +122,12 @@ def test_reports_in_german(extension, empty, speak):
 
 
 def test_sentences_within_sentences(i18n, speak):
-    inner = i18n.say("{socket} is linked", socket=i18n.Sentence("IOR"))
+    inner = i18n.say("{socket} is animated", socket=i18n.Sentence("IOR"))
     outer = i18n.say("{material}, {node}: stays, {why}", material="M", node="Glass", why=inner)
-    assert outer == "M, Glass: stays, IOR is linked"
+    assert outer == "M, Glass: stays, IOR is animated"
     assert i18n.iface(copy.deepcopy(outer)) == outer
     speak("de_DE")
-    assert i18n.iface(outer) == "M, Glass: bleibt, IOR ist verbunden"
+    assert i18n.iface(outer) == "M, Glass: bleibt, IOR ist animiert"
     assert i18n.iface("another text") == "another text"
 
 

@@ -458,6 +458,18 @@ def test_why_a_model_stands_below_one_with_a_larger_error_is_said(tmp_path):
     assert len(lines) == 3 and "mirror" not in lines[2], lines
 
 
+def test_a_table_is_read_however_its_text_is_written(tmp_path):
+    file = tmp_path / "m.csv"
+    axes = grid(range(0, 91, 15), [0], range(0, 91, 15), range(0, 181, 15))
+    f = 0.1 + axes[0] / 900
+    text = angle_table(*axes, f, f, f)
+    found = []
+    for data in (text.encode(), text.replace("\n", "\r").encode(), text.encode("utf-16")):
+        file.write_bytes(data)
+        found.append({k: v for k, v in told(file).items() if k != "seconds"})
+    assert found[0] == found[1] == found[2]
+
+
 def test_radians_are_named_or_refused(tmp_path):
     file = tmp_path / "m.csv"
     axes = grid(range(0, 91, 15), [0], range(0, 91, 15), range(0, 181, 15))

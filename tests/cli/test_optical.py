@@ -132,6 +132,69 @@ def test_a_file_is_a_conductor_or_a_dielectric(tmp_path):
     assert glass["k"] == [0, 0, 0] and glass["n"] == pytest.approx([1.516, 1.518, 1.521], abs=2e-3)
 
 
+TABLE = "# Mine\nWL,N,K\n0.35,0.2,3\n0.5,0.4,3.5\n0.8,0.3,4\n"
+ENCODED = {
+    "capitals": TABLE.encode(),
+    "line ends of old Macs": TABLE.replace("\n", "\r").encode(),
+    "line ends of Windows": TABLE.replace("\n", "\r\n").encode(),
+    "UTF-16 of Windows": TABLE.replace("\n", "\r\n").encode("utf-16"),
+    "UTF-16, big-endian": "\ufeff".encode("utf-16-be") + TABLE.encode("utf-16-be"),
+    "YAML": b"# this file is part of a database\n\nREFERENCES: |\n    A. Nyone.\n"
+    b'    <a href="https://doi.org/1">Own data</a> (2020)\nCOMMENTS: |\n    DATA: none\nDATA:\n'
+    b"  - type: tabulated nk\n    data: |\n        0.35 0.2 3\n        0.5 0.4 3.5\n"
+    b"        0.8 0.3 4\nCONDITIONS:\n  temperature: 300\n",
+    "YAML of two tables": b"DATA:\n- type: tabulated n\n  data: |\n    0.35 0.2\n    0.5 0.4\n"
+    b"    0.8 0.3\n- type: tabulated k\n  data: |\n    0.35 3\n    0.5 3.5\n    0.8 4\n",
+}
+
+
+@pytest.mark.parametrize("way", ENCODED)
+def test_a_table_is_read_however_it_is_written(tmp_path, optics, way):
+    file = tmp_path / ("own.yml" if "YAML" in way else "own.csv")
+    plain = tmp_path / "plain.csv"
+    plain.write_text(TABLE.lower())
+    file.write_bytes(ENCODED[way])
+    told, wanted = optical(file), optical(plain)
+    package = optics.read(file)
+    assert (told["n"], told["k"]) == (wanted["n"], wanted["k"])
+    assert package.n.values == (0.2, 0.4, 0.3) and package.k.values == (3, 3.5, 4)
+    label = "own" if "YAML" in way else "Mine"
+    assert told["label"] == package.label == label
+    if way == "YAML":
+        assert package.source == told["source"] == "A. Nyone. Own data (2020)"
+
+
+#: Published coefficients, and n at the line d (587.56 nm) from the same publications: fused silica
+#: (Malitson 1965), water at 20 C (Daimon and Masumura 2007), air (Ciddor 1996); and own ones.
+FORMULAS = {
+    1: ("0 0.6961663 0.0684043 0.4079426 0.1162414 0.8974794 9.896161", 1.45846),
+    2: (
+        "0 5.684027565E-1 5.101829712E-3 1.726177391E-1 1.821153936E-2 2.086189578E-2 "
+        "2.620722293E-2 1.130748688E-1 1.069792721E1",
+        1.33340,
+    ),
+    3: ("2.25 0.01 -2 -0.01 2", (2.25 + 0.01 / 0.58756**2 - 0.01 * 0.58756**2) ** 0.5),
+    5: ("1.5 0.004 -2", 1.5 + 0.004 / 0.58756**2),
+    6: ("0 0.05792105 238.0185 0.00167917 57.362", 1.000277),
+}
+
+
+@pytest.mark.parametrize("formula", FORMULAS)
+def test_formulas_of_the_database_are_tabulated(tmp_path, optics, formula):
+    coefficients, index = FORMULAS[formula]
+    file = tmp_path / "own.yml"
+    file.write_text(
+        f"DATA:\n  - type: formula {formula}\n    wavelength_range: 0.35 1.1\n"
+        f"    coefficients: {coefficients}\n"
+        "  - type: tabulated k\n    data: |\n        0.38 1E-7\n        0.75 2E-7\n"
+    )
+    told, package = optical(file), optics.read(file)
+    assert told["n_d"] == pytest.approx(index, abs=1e-5)
+    assert package.index_d == pytest.approx(told["n_d"], rel=1e-12)
+    assert package.n.nm[0] == 380 and package.n.nm[-1] == 780 and len(package.n.nm) == 81
+    assert package.k.values == (1e-7, 2e-7)
+
+
 def spectrum(rows):
     """At the observer's wavelengths in nm: interpolated linearly, and constant beyond the ends."""
     um, values = zip(*rows, strict=True)
@@ -334,6 +397,19 @@ BAD = {
     "wl,n\n0.45,1.5\n0.78,1.5\n": ": expected n from 0.43 to 0.65 µm, got 0.45 to 0.78",
     "wl,n\n1,0\n2,0\n": ": expected n in the visible, found none",
     "wl,n\n0.3,1\n0.8,1\nwl,k\n0.5,1\n": ": expected k from 0.43 to 0.65 µm, got 0.5 to 0.5",
+    "w\0l\0": ": expected text, in UTF-8, or in UTF-16 with a byte-order mark",
+    "DATA:\n  type: tabulated n\n": " line 2: expected '- type: ...', got 'type: tabulated n'",
+    "DATA:\n  - type: tabulated n2\n    data: |\n      0.3 1\n": " line 2: expected tabulated n, k "
+    "or nk, or formula 1, 2, 3, 5 or 6, got 'tabulated n2'; the page of the substance on "
+    "refractiveindex.info has its table under Data > CSV",
+    "DATA:\n  - type: tabulated k\n    data: |\n      0.3 1\n      0.8 1\n": ": expected n under "
+    "DATA, found none",
+    "DATA:\n  - type: tabulated nk\n    data: |\n      0.3 1\n": " line 4: expected 3 numbers, a "
+    "wavelength in µm and n and k, got '0.3 1'",
+    "DATA:\n  - type: formula 2\n    wavelength_range: 0.3 1\n    coefficients: 0 1\n": " line 2: "
+    "expected coefficients of formula 2, a number and pairs of numbers",
+    "DATA:\n  - type: formula 2\n    coefficients: 0 1 0.1\n": " line 2: expected a "
+    "wavelength_range of two numbers in µm",
 }
 
 
@@ -349,7 +425,7 @@ def test_what_is_wrong_in_a_file_is_said(tmp_path, optics, text):
 
 def test_names_that_there_are_not_are_errors(tmp_path, optics):
     for name, expected in (
-        ("unobtainium", "expected a file NAME.csv or NAME.txt, or one of aluminium"),
+        ("unobtainium", "expected a file NAME.csv, NAME.txt or NAME.yml, or one of aluminium"),
     ):
         done = run("optical", name)
         assert done.returncode == 2 and expected in done.stderr and name in done.stderr
@@ -388,7 +464,7 @@ def test_a_scene_names_a_substance_or_a_file(tmp_path):
     for change, expected in (
         (
             {"optical": "mithril"},
-            "materials.a.optical: expected a file NAME.csv or NAME.txt, or one of",
+            "materials.a.optical: expected a file NAME.csv, NAME.txt or NAME.yml, or one of",
         ),
         ({"optical": "none.csv"}, "materials.a.optical: "),
         ({"parameters": {"n_r": 1}}, 'n_r: "optical" says what it is'),

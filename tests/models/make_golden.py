@@ -516,8 +516,13 @@ def fresnel(c, eta):
 
 
 def dielectric_albedo(p, cos_o):
-    """A boundary absorbs nothing: what is not reflected is transmitted."""
-    return [mp.mpf(1)] * 3
+    """A boundary absorbs nothing: what is not reflected is transmitted, but for tints."""
+    white = (1, 1, 1)
+    kept = p.get("reflected", white), p.get("refracted", white)
+    if kept == (white, white):
+        return [mp.mpf(1)] * 3
+    mirror = fresnel(cos_o, mp.mpf(p["ior"]))
+    return [mirror * a + (1 - mirror) * b for a, b in zip(*kept, strict=True)]
 
 
 def conductor_albedo(p, cos_o):
@@ -1487,7 +1492,12 @@ MODELS = {
     "fresnel_dielectric": dict(
         albedo=dielectric_albedo,
         defaults={"ior": 1.5},
-        cases=[{}, {"ior": 2.4}, {"ior": 0.75}],
+        cases=[
+            {},
+            {"ior": 2.4},
+            {"ior": 0.75},
+            {"refracted": (0.9, 0.5, 0), "reflected": (0.2, 0.5, 1)},
+        ],
         cosines=[1, 0.5, 0.1, 0.001],
     ),
     "glass": dict(
