@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Materials of measured BRDFs: files made here from formulas, and what is found in them."""
 
+import functools
 import itertools
 import json
 import math
@@ -175,31 +176,50 @@ def blocks(picture):
     return picture[..., :3].reshape(6, 8, 6, 8, 3).mean((1, 3))[1:5, 1:5]
 
 
-@pytest.fixture
-def ball(program, tmp_path):
+@pytest.fixture(scope="module")
+def ball(program, tmp_path_factory):
     """ball(name, material): the file of a scene, a ball under a lamp and a grey sky, and its blocks
-    by the reference."""
+    by the reference. Equal ones are made once for all tests."""
+    folder = tmp_path_factory.mktemp("balls")
 
-    def render(name, material):
-        file, out = tmp_path / f"{name}.json", tmp_path / f"{name}.exr"
-        file.write_text(json.dumps(BALL | {"materials": {"m": material}}))
+    @functools.cache
+    def render(name, text):
+        file, out = folder / f"{name}.json", folder / f"{name}.exr"
+        file.write_text(json.dumps(BALL | {"materials": {"m": json.loads(text)}}))
         subprocess.run([program, "render", file, "--out", out], check=True, capture_output=True)
         pixels = helpers.open_image_io().ImageBuf(str(out)).get_pixels()
         return file, blocks(pixels[::-1])  # row 0 at the bottom, as in helpers.render()
 
-    return render
+    return lambda name, material: render(name, json.dumps(material))
+
+
+@pytest.fixture(scope="module")
+def resolved(program, tmp_path_factory):
+    """resolved(file): a scene's file with what is fitted to its data in their place."""
+    folder = tmp_path_factory.mktemp("resolved")
+
+    @functools.cache
+    def resolve(file):
+        subprocess.run([program, "scene", file, "--out", folder / file.stem], check=True)
+        return folder / file.stem / "scene.json"
+
+    return resolve
 
 
 @pytest.fixture
-def in_blender(extension, empty, program, tmp_path):
+def in_blender(extension, empty, resolved):
     """in_blender(file, osl): the blocks of a scene's file by Blender."""
 
     def render(file, osl):
-        subprocess.run([program, "scene", file, "--out", tmp_path / file.stem], check=True)
-        resolved = tmp_path / file.stem / "scene.json"
-        return blocks(helpers.render(extension.scene_loader.load_scene(resolved, osl=osl)))
+        return blocks(helpers.render(extension.scene_loader.load_scene(resolved(file), osl=osl)))
 
     return render
+
+
+@pytest.fixture(scope="module")
+def two_colored(write_table):
+    """A Ward highlight with a colour of its own over a matte surface."""
+    return write_table("paint.csv", "ward", matte=0.2, ks=(0.2, 0.1, 0.05), ax=0.2, ay=0.2)
 
 
 @pytest.mark.slow
@@ -216,12 +236,11 @@ def test_blender_and_the_reference_have_one_sum(ball, in_blender, osl):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("osl", [True, False])
-def test_curves_look_as_the_data_do(ball, in_blender, write_table, osl):
-    """The reference renders the data themselves. A Ward highlight with a colour of its own over a
-    matte surface: no other single model is near."""
-    path = write_table("paint.csv", "ward", matte=0.2, ks=(0.2, 0.1, 0.05), ax=0.2, ay=0.2)
-    file, fitted = ball("curves", {"measured": str(path), "as": "factors"})
-    _, data = ball("data", {"measured": str(path)})
+def test_curves_look_as_the_data_do(ball, in_blender, two_colored, osl):
+    """The reference renders the data themselves, to which no other single model is near."""
+    path = str(two_colored)
+    file, fitted = ball("curves", {"measured": path, "as": "factors"})
+    _, data = ball("data", {"measured": path})
     got = in_blender(file, osl)
     assert np.abs(got / fitted - 1).max() < 0.03
     assert np.abs(got / data - 1).max() < 0.06

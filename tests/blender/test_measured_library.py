@@ -69,7 +69,9 @@ def load(blend):
 
 
 @pytest.mark.long
-def test_a_folder_becomes_a_catalogue(extension, empty, folder, tmp_path):
+def test_a_folder_becomes_a_catalogue(
+    extension, module, empty, folder, tmp_path, tmp_path_factory, monkeypatch
+):
     blend, cats = tmp_path / "measured.blend", tmp_path / "blender_assets.cats.txt"
     mine = str(uuid.uuid4())
     paper = str(uuid.uuid4())
@@ -112,10 +114,23 @@ def test_a_folder_becomes_a_catalogue(extension, empty, folder, tmp_path):
     red, white = color(materials["red.csv"]), color(materials["white"])
     assert red[0] > 2 * red[1] and white[2] > 2 * red[2] and np.ptp(white) < 0.1
     assert not [item for item in bpy.data.objects if item.library], "no scene of the pictures"
-    # Once more: the files are replaced, and no catalogue comes twice.
-    text = cats.read_text()
+    # Once more: the file is replaced, and no catalogue comes twice. The second Blender is replaced
+    # by a program that copies what it made: pictures take seconds.
+    text, bytes_before = cats.read_text(), blend.read_bytes()
+    kept = tmp_path_factory.mktemp("kept") / blend.name
+    kept.write_bytes(bytes_before)
+    blend.unlink()
+    bpy.data.libraries.write(str(blend), set(), compress=False)
+    script = (
+        "import pathlib, shutil, sys; folder = pathlib.Path(sys.argv[2]);"
+        "shutil.copy(sys.argv[1], folder / 'materials.blend');"
+        "(folder / 'refusals.json').write_text('{}')"
+    )
+    command = [sys.executable, "-c", script, str(kept)]
+    monkeypatch.setattr(module, "build_command", lambda *arguments: [*command, *arguments])
     again = extension.api.new_measured_library(folder, blend, "lambert")
     assert again.materials == made.materials and cats.read_text() == text
+    assert blend.read_bytes() == bytes_before
 
 
 def test_the_part_done_never_falls(module, folder, tmp_path, monkeypatch):

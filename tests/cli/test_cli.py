@@ -686,7 +686,20 @@ def phong(tmp_path):
     return build
 
 
+@pytest.fixture(scope="module")
+def kept_fits(tmp_path_factory):
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture
+def fits_made_once(kept_fits, monkeypatch):
+    """For tests that look at what is chosen among fits, and not at what is said when they are
+    made."""
+    monkeypatch.setenv("BRDFC_CACHE", str(kept_fits))
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("fits_made_once")
 @pytest.mark.parametrize(
     ("options", "form"),
     [
