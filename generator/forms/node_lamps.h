@@ -11,9 +11,10 @@
 // that is small for the lobe. The two parts add up to f cos in every direction.
 //
 // A ball or a sun fills its cone. A rectangle or an ellipse does not, so its closures carry the light of the whole
-// lamp. An ellipse has the largest cone that fits into it. A rectangle has up to four in a row, along the axis that
-// looks longer from the shading point. They may overlap, since only their sum counts. All of them carry the same value,
-// so that the model's formula runs once. Cycles drops closures with a small weight, so the cone of a small lamp is
+// lamp. An ellipse has the largest cone that fits into it. A rectangle has up to four: two by two if it looks about
+// square from the shading point, otherwise in a row along the axis that looks longer. Each carries the light of its part
+// of the rectangle, with the model's value at a point of that part. So if an object hides a part of the lamp, its light
+// is missing, and not that of the average over the lamp. Cones may overlap, since only their sum counts. Cycles drops closures with a small weight, so the cone of a small lamp is
 // widened until it carries kWidened of the light; that share of the light beside the lamp then counts twice. If the
 // cones of two lamps overlap, light in the overlap would count twice. If one of them is a rectangle or an ellipse and
 // the other is a much smaller ball or sun, as behind a window, the wide one has a cone beside the small one
