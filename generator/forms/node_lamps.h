@@ -12,14 +12,14 @@
 //
 // A ball or a sun fills its cone. A rectangle or an ellipse does not, so its closures carry the light of the whole
 // lamp. An ellipse has the largest cone that fits into it. A rectangle has up to four: two by two if it looks about
-// square from the shading point, otherwise in a row along the axis that looks longer. Each carries the light of its part
-// of the rectangle, with the model's value at a point of that part. So if an object hides a part of the lamp, its light
-// is missing, and not that of the average over the lamp. Cones may overlap, since only their sum counts. Cycles drops closures with a small weight, so the cone of a small lamp is
-// widened until it carries kWidened of the light; that share of the light beside the lamp then counts twice. If the
-// cones of two lamps overlap, light in the overlap would count twice. If one of them is a rectangle or an ellipse and
-// the other is a much smaller ball or sun, as behind a window, the wide one has a cone beside the small one
-// (cone_aside). Otherwise the earlier lamp in the list, which is sorted by size with the widest first, is left to drawn
-// directions.
+// square from the shading point, otherwise in a row along the axis that looks longer. Each carries the light of its
+// part of the rectangle, with the model's value at a point of that part. So if an object hides a part of the lamp, its
+// light is missing, and not that of the average over the lamp. Cones may overlap, since only their sum counts. Cycles
+// drops closures with a small weight, so the cone of a small lamp is widened until it carries kWidened of the light;
+// that share of the light beside the lamp then counts twice. If the cones of two lamps overlap, light in the overlap
+// would count twice. If one of them is a rectangle or an ellipse and the other is a much smaller ball or sun, as behind
+// a window, the wide one has a cone beside the small one (cone_aside). Otherwise the earlier lamp in the list, which is
+// sorted by size with the widest first, is left to drawn directions.
 //
 // The formulas run only as nodes (print/node_program.h), for which a division by 0 and the root of a negative number
 // give 0.
@@ -175,8 +175,9 @@ Risen<T> risen(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& 
 /// already accounts for them.
 template <class T> LampCone<T> cone_of(const LampSlot<T>& given, const LampAxes<T>& whole, const Vec3<T>& at,
                                        const Vec3<T>& wo, const Vec3<T>& normal) {
-  /// kPoint is the sine of the radius of lamps without size. kInside is the squared sine of a ball from which drawn directions meet it often enough. kLeastRise is the minimum height of the cone's rim
-  /// over the horizon of the closure's normal.
+  /// kPoint is the sine of the radius of lamps without size. kInside is the squared sine of a ball from which drawn
+  /// directions meet it often enough. kLeastRise is the minimum height of the cone's rim over the horizon of the
+  /// closure's normal.
   constexpr double kInside = 0.95, kPoint = 1e-4, kLeastRise = 0.01;
   // f is averaged over the whole lamp, with zeros below the horizon. If a smaller part of a mesh is above the horizon,
   // light is lost; otherwise few samples would have to carry it.

@@ -36,9 +36,7 @@ LampAxes<Expr> axes_input() {
   return {input3("across"), input3("along"), input3("away"), Expr::input("half_across"), Expr::input("half_along")};
 }
 
-LampPart<Expr> part_input() {
-  return {Expr::input("index"), Expr::input("side_across"), Expr::input("side_along")};
-}
+LampPart<Expr> part_input() { return {Expr::input("index"), Expr::input("side_across"), Expr::input("side_along")}; }
 void take_part(LampCone<Expr>& cone) {
   cone.part_across = Expr::input("part_across");
   cone.part_along = Expr::input("part_along");
@@ -163,8 +161,9 @@ NodeProgram record_lobe() {
     cone.cones.layout = Expr::input("layout");
     cone.drop = Expr::input("drop");
     const Expr emphasis = select(cone.flat > Expr(0.5), Expr::input("emphasis"), times_cone(cone, cone.of_cones));
-    const ToonLobe<Expr> lobe = toon_lobe(input3("shape"), cone, Expr::input("of_part"), emphasis, Expr::input("density"), Expr::input("room"),
-                                          Rgb<Expr>::input("value"), Expr::input("u_2"));
+    const ToonLobe<Expr> lobe =
+        toon_lobe(input3("shape"), cone, Expr::input("of_part"), emphasis, Expr::input("density"), Expr::input("room"),
+                  Rgb<Expr>::input("value"), Expr::input("u_2"));
     p.output("color", lobe.color);
     p.output("size", lobe.size);
   });
