@@ -24,7 +24,7 @@ EMPTY, BALL, SUN, RECTANGLE, ELLIPSE, SKY_SUN = range(6)
 #: others in that plane. Formula Nodes read both (content/formula_lamps.py), other shaders skip
 #: them.
 CODE = 8.0
-#: Most cones of a rectangle. Formula Nodes have a closure for each, and compute the model for it.
+#: Most cones of a flat lamp. Formula Nodes have a closure for each, and compute the model for it.
 MOST_CONES = 4
 #: Index of that number in a slot.
 _SHAPE = 9
@@ -141,18 +141,16 @@ class Driven:
 @dataclass(frozen=True)
 class Sheet:
     """A flat lamp in world space: its centre, its axes as rows, the last of which is the normal,
-    its two sizes, whether it is a rectangle, and whether it keeps its place without the
-    extension."""
+    its two sizes, and whether it keeps its place without the extension."""
 
     centre: np.ndarray
     axes: np.ndarray
     sizes: tuple
-    is_rectangle: bool
     stays: bool
 
     def cones(self):
         """How many cones it should have (generator/forms/node_lamps.h)."""
-        return MOST_CONES if self.is_rectangle and min(self.sizes) > 0 else 1
+        return MOST_CONES if min(self.sizes) > 0 else 1
 
     def is_beside(self, other):
         """Whether both are in one plane, shine the same way and do not overlap, in the directions

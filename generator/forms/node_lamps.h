@@ -11,15 +11,15 @@
 // that is small for the lobe. The two parts add up to f cos in every direction.
 //
 // A ball or a sun fills its cone. A rectangle or an ellipse does not, so its closures carry the light of the whole
-// lamp. An ellipse has the largest cone that fits into it. A rectangle has up to four: two by two if it looks about
-// square from the shading point, otherwise in a row along the axis that looks longer. Each carries the light of its
-// part of the rectangle, with the model's value at a point of that part. So if an object hides a part of the lamp, its
-// light is missing, and not that of the average over the lamp. Cones may overlap, since only their sum counts. Cycles
-// drops closures with a small weight, so the cone of a small lamp is widened until it carries kWidened of the light;
-// that share of the light beside the lamp then counts twice. If the cones of two lamps overlap, light in the overlap
-// would count twice. If one of them is a rectangle or an ellipse and the other is a much smaller ball or sun, as behind
-// a window, the wide one has a cone beside the small one (cone_aside). Otherwise the earlier lamp in the list, which is
-// sorted by size with the widest first, is left to drawn directions.
+// lamp. A wide one that looks about square or round from the shading point has four cones, two by two; otherwise a
+// rectangle has up to four in a row along the axis that looks longer, and an ellipse the largest that fits into it.
+// Each carries the light of its part of the lamp, with the model's value at a point of that part. So if an object hides
+// a part of the lamp, its light is missing, and not that of the average over the lamp. Cones may overlap, since only
+// their sum counts. Cycles drops closures with a small weight, so the cone of a small lamp is widened until it carries
+// kWidened of the light; that share of the light beside the lamp then counts twice. If the cones of two lamps overlap,
+// light in the overlap would count twice. If one of them is a rectangle or an ellipse and the other is a much smaller
+// ball or sun, as behind a window, the wide one has a cone beside the small one (cone_aside). Otherwise the earlier
+// lamp in the list, which is sorted by size with the widest first, is left to drawn directions.
 //
 // The formulas run only as nodes (print/node_program.h), for which a division by 0 and the root of a negative number
 // give 0.
@@ -56,18 +56,21 @@ template <class T> LampAxes<T> lamp_axes(const LampSlot<T>& slot) {
   return axes;
 }
 
-/// How the cones of a rectangle are arranged: 1 to 4 of them in a row along the axis `across`, or -2 to -4 along the
+/// How the cones of a flat lamp are arranged: 1 to 4 of them in a row along the axis `across`, or -2 to -4 along the
 /// axis `along`, or kGrid for two by two.
 inline constexpr double kGrid = 8;
 template <class T> auto in_grid(const T& layout) { return T(kGrid / 2) < layout; }
 template <class T> T count_of(const T& layout) { return select(in_grid(layout), T(4), abs(layout)); }
 
-/// The cones of a rectangle, as seen from a shading point.
+/// In the unit circle, the radius of four circles that touch it and each other, and the coordinates of their middles.
+inline constexpr double kQuarter = 0.41421356;
+
+/// The cones of a flat lamp, as seen from a shading point.
 template <class T> struct LampCones {
   T layout;
   T count;  ///< count_of(layout), which Cycles would keep for each lamp
-  T sine;   ///< of the radius that they would have in the middle of the lamp
-  T alone;  ///< the sine of the radius of the largest cone about the middle of the lamp
+  T scale;  ///< their size in units of that of one cone
+  T alone;  ///< for a rectangle, the sine of the radius of the largest cone about its middle
   T moved;  ///< from the middle of the lamp to those of the outermost cones, in units of the half axis, divided by the
             ///< distance of the lamp
 };
@@ -78,9 +81,9 @@ template <class T> struct LampCones {
 /// edge. If A and B are half the lamp's axes and C is its middle, the plane through the edge at C + A has the normal
 /// B x (C + A). So the sine of the angle between C and that plane is |det(A, B, C)| / (|C| |B x (C + A)|). For the
 /// point C + tA of the lamp it is (1 - t) times that, with |C + tA| in place of |C|.
-template <class T, class Many, class Wide>
-LampCones<T> cones_of_rectangle(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& centre,
-                                const Many& many, const Wide& wide) {
+template <class T, class Many, class Wide> LampCones<T> cones_of_flat(const LampSlot<T>& slot, const LampAxes<T>& lamp,
+                                                                      const Vec3<T>& centre, const Many& many,
+                                                                      const Wide& wide) {
   // Of a rectangle that looks shorter than kTwo, for its width, two cones in a row cover hardly more than one; of one
   // that looks longer than kLong, two by two cover less than a row.
   constexpr double kTwo = 1.1, kLong = 1.5;
@@ -93,15 +96,18 @@ LampCones<T> cones_of_rectangle(const LampSlot<T>& slot, const LampAxes<T>& lamp
   const T longer2 = maximum(at_a2, at_b2), ratio = sqrt(longer2 / minimum(at_a2, at_b2));
   const auto more_than = [&](double limit) { return select(T(limit) < ratio, T(1), T(0)); };
   LampCones<T> cones;
+  const auto round = T(3.5) < slot.kind;
   const auto grid = many && wide && T(3.5) < slot.most && ratio < T(kLong);
-  const T in_row = select(many, minimum(slot.most, T(1) + more_than(kTwo) + more_than(2) + more_than(3)), T(1));
+  const T in_row =
+      select(many && !round, minimum(slot.most, T(1) + more_than(kTwo) + more_than(2) + more_than(3)), T(1));
   const T row = select(T(1.5) < in_row, T(1) - T(1) / ratio, T(0));
   cones.layout = select(many, select(grid, T(kGrid), select(a_is_longer, in_row, -in_row)), T(1));
   cones.count = select(grid, T(4), in_row);
-  cones.moved = select(grid, T(0.5), row) / sqrt(c2);
+  const T half = select(round, T(kQuarter), T(0.5));
+  cones.scale = select(grid, half, T(1));
+  cones.moved = select(grid, half, row) / sqrt(c2);
   const T volume = lamp.half_across * lamp.half_along * abs(dot(lamp.away, centre));
   cones.alone = volume / sqrt(longer2 * c2);
-  cones.sine = cones.alone * select(grid, T(0.5), T(1));
   return cones;
 }
 
@@ -110,7 +116,7 @@ LampCones<T> cones_of_rectangle(const LampSlot<T>& slot, const LampAxes<T>& lamp
 template <class T> struct LampCone {
   Vec3<T> towards;     ///< unit vector to the middle of the lamp, for a rectangle that of its part above the horizon
   Vec3<T> aim;         ///< unit vector along the axis of a single cone, which may be within the lamp
-  LampCones<T> cones;  ///< of a rectangle
+  LampCones<T> cones;  ///< of a flat lamp
   T part_across, part_along;  ///< see Risen; 1 for other lamps
   T drop;                     ///< 1 - cos of the radius of a ball or a sun
   T of_cones;                 ///< solid angle of all cones, if they were in the middle of the lamp
@@ -217,10 +223,13 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& given, const LampAxes<
   // An axis that is raised from the horizon, see below, only increases that cosine where it is small.
   const T above_closure = sqrt(T(0.5) * dot(cone.towards, wo) + T(0.5)) - T(kLeastRise);
   const auto several = T(1.5) < slot.most && T(0.5) < part.level && above_closure > narrower + diagonal * T(0.5);
-  cone.cones = cones_of_rectangle(slot, lamp, centre, several, T(kWide) < diagonal);
+  cone.cones = cones_of_flat(slot, lamp, centre, several, T(kWide) < diagonal);
   // The largest cone about the centre that fits within a disk: its rim touches the disk where the plane recedes.
-  const T tangent = narrower * facing / (T(1) + narrower * sqrt(T(1) - facing * facing)), tangent2 = tangent * tangent;
-  const T of_flat = select(rectangle, sqr(cone.cones.sine), tangent2 / (T(1) + tangent2));
+  const auto in_disk = [&](const T& radius) {
+    const T tangent2 = sqr(radius * facing / (T(1) + radius * sqrt(T(1) - facing * facing)));
+    return tangent2 / (T(1) + tangent2);
+  };
+  const T of_flat = select(rectangle, sqr(cone.cones.alone * cone.cones.scale), in_disk(narrower * cone.cones.scale));
   const T size2 = select(ball, of_ball, select(flat, of_flat, of_sun));
   const T size = maximum(sqrt(size2), T(kPoint));
   // blender_addon/lamps/kinds: the first scale is 0 for a mesh, which need not fill its ball.
@@ -240,7 +249,7 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& given, const LampAxes<
   cone.chord = sqrt(T(2) * whole_drop) + T(2 * kNarrow);
   cone.reach = select(flat, diagonal + T(2 * kNarrow), cone.chord) + lift;
   const T inner = select(lift < T(kPoint) && !(rectangle && T(0.5) < part.cut),
-                         minimum(select(kind < T(3.5), cone.cones.alone, size), room), T(0));
+                         minimum(select(kind < T(3.5), cone.cones.alone, sqrt(in_disk(narrower))), room), T(0));
   cone.inner = sqrt(T(2) * drop_of(sqr(inner)));
   cone.flat = select(flat, T(1), T(0));
   const auto used = kind > T(0.5);
@@ -272,9 +281,8 @@ template <class T> struct ConeOfPart {
   Vec3<T> axis;
   T chord;  ///< its radius
 };
-/// `most`: how many the lamp may have.
-template <class T>
-ConeOfPart<T> cone_at(const T& most, const LampAxes<T>& lamp, const LampCone<T>& cone, const LampPart<T>& part) {
+template <class T> ConeOfPart<T> cone_at(const LampSlot<T>& slot, const LampAxes<T>& lamp, const LampCone<T>& cone,
+                                         const LampPart<T>& part) {
   const T layout = cone.cones.layout;
   const auto grid = in_grid(layout), along = layout < T(0);
   const T in_row = T(2) * part.index / (abs(layout) - T(1)) - T(1);
@@ -283,11 +291,12 @@ ConeOfPart<T> cone_at(const T& most, const LampAxes<T>& lamp, const LampCone<T>&
   const Vec3<T> axis =
       cone.aim + (lamp.across * (lamp.half_across * x) + lamp.along * (lamp.half_along * y)) * cone.cones.moved;
   const T shorter = T(1) / sqrt(dot(axis, axis));
-  // The nearer a part is, the larger it looks.
+  // The nearer a part is, the larger it looks. That of an ellipse also looks narrower, the farther it is.
+  const T nearer2 = sqr(shorter) * select(T(3.5) < slot.kind, minimum(sqr(shorter), T(1)), T(1));
   const T middle2 = cone.of_cones / (count_of(layout) * T(kPi));
-  const T sine2 = minimum(middle2 * (T(1) - middle2 / T(4)) * sqr(shorter), T(kWidest * kWidest));
+  const T sine2 = minimum(middle2 * (T(1) - middle2 / T(4)) * nearer2, T(kWidest * kWidest));
   const T chord2 = T(2) * sine2 / (T(1) + sqrt(T(1) - sine2));
-  const auto several = T(1.5) < most && T(1.5) < count_of(layout);
+  const auto several = T(1.5) < slot.most && T(1.5) < count_of(layout);
   return {select(several, axis * shorter, cone.aim), sqrt(select(several, chord2, middle2))};
 }
 
@@ -369,22 +378,22 @@ template <class T> struct FlatPoint {
   Vec3<T> wi;  ///< unit vector to the point
   T emphasis;  ///< emphasis_at() the point
 };
-/// The point of a rectangle lies in the given part. Points of neighbouring parts are mirrored, so that they are on the
+/// The point lies in the given part. Points of neighbouring parts are mirrored, so that they are on the
 /// whole less noisy.
 template <class T> FlatPoint<T> flat_point(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
                                            const LampCone<T>& cone, const LampPart<T>& part, const T& u, const T& v) {
   const auto round = slot.kind > T(3.5);
-  const T radius = sqrt(u), turn = T(2) * pi<T>() * v;
   const T layout = cone.cones.layout;
   const auto grid = in_grid(layout), along = layout < T(0);
+  const T radius = sqrt(u), turn = pi<T>() * v * select(grid, T(0.5), T(2));
   // From -1 to 1 in the part, then in the part of the lamp above the horizon, then in the whole lamp.
   const T p = (T(1) - T(2) * u) * part.across, q = (T(2) * v - T(1)) * (part.across * part.along);
   const auto in_row = [&](const T& p) { return (p + T(2) * part.index + T(1)) / abs(layout) - T(1); };
   const T x_above = select(grid, (p + part.across) / T(2), select(along, p, in_row(p)));
   const T y_above = select(grid, (q + part.along) / T(2), select(along, in_row(q), q));
   const auto within = [](const T& part, const T& x) { return select(part < T(0), T(-1), T(1)) - part + part * x; };
-  const T x = select(round, radius * cos(turn), within(cone.part_across, x_above));
-  const T y = select(round, radius * sin(turn), within(cone.part_along, y_above));
+  const T x = select(round, radius * cos(turn) * part.across, within(cone.part_across, x_above));
+  const T y = select(round, radius * sin(turn) * part.along, within(cone.part_along, y_above));
   const Vec3<T> point = lamp.across * (lamp.half_across * x) + lamp.along * (lamp.half_along * y) + (slot.place - at);
   const T distance2 = dot(point, point);
   FlatPoint<T> out;

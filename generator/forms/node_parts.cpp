@@ -113,7 +113,7 @@ NodeProgram record_cone_at() {
     cone.cones.moved = Expr::input("moved");
     take_part(cone);
     cone.of_cones = Expr::input("of_cones");
-    const ConeOfPart<Expr> found = cone_at(Expr::input("most"), axes_input(), cone, part_input());
+    const ConeOfPart<Expr> found = cone_at(slot_input(), axes_input(), cone, part_input());
     p.output("axis", found.axis);
     p.output("of_part", found.chord);
   });

@@ -426,8 +426,8 @@ def test_nodes_have_room_for_the_lamps_of_the_scene(extension, new_file):
 
 
 def test_room_for_the_cones_of_an_area_lamp(extension, new_file):
-    """Nodes compute the model four times for each lamp only where a lamp is a rectangle; and what
-    was needed once stays."""
+    """Nodes compute the model four times for each lamp only where a lamp is flat; and what was
+    needed once stays."""
     few_samples(new_file, 16, 24)
     add_camera(new_file)
     material = extension.api.new_material("cook_torrance")
@@ -439,7 +439,7 @@ def test_room_for_the_cones_of_an_area_lamp(extension, new_file):
     lamp.data.shape, lamp.data.size = "SQUARE", 2.0
     render(new_file)
     assert room_of(extension, material) == (2, 4)
-    lamp.data.shape = "DISK"
+    lamp.data.type = "POINT"
     for x in (-3.0, 2.0):
         add_lamp(new_file, x)
     render(new_file)

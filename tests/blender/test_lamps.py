@@ -176,14 +176,14 @@ def test_every_type_of_lamp(ball, empty, subtests):
             assert slots(empty) == []
 
 
-def test_cones_of_rectangles(extension, ball, empty, monkeypatch):
-    """A rectangle may have four, or as many as a material's closures have room for."""
+def test_cones_of_flat_lamps(extension, ball, empty, monkeypatch):
+    """Each may have four, or as many as a material's closures have room for."""
     lamp = add_lamp(empty, "AREA", shape="RECTANGLE", size=1.0, size_y=0.1)
     assert codes(empty) == [(4, 0)]
     (slot,) = slots(empty)
     assert_lamp(slot, lamp)
     lamp.data.shape = "ELLIPSE"
-    assert codes(empty) == [(1, 0)]
+    assert codes(empty) == [(4, 0)]
     lamp.data.shape = "RECTANGLE"
     faint = add_lamp(empty, "AREA", "Faint", (5, 0, 9), shape="RECTANGLE", size=1.0, size_y=0.1)
     faint.data.energy = 0.01

@@ -42,7 +42,7 @@ class Area(Light):
             return None
         axes = np.array([column.normalized() for column in matrix.to_3x3().transposed()])
         centre, stays = np.array(matrix.translation), item is None or keeps_its_place(item)
-        return slots.Sheet(centre, axes, self._scaled(light, matrix), not _is_round(light), stays)
+        return slots.Sheet(centre, axes, self._scaled(light, matrix), stays)
 
     def _scaled(self, light, matrix):
         """Its two sizes in world space."""

@@ -308,9 +308,8 @@ def _sheet(name, radiance, kind, middle, frame, sizes):
         candidate.values = slots.numbers(
             kind, tuple(middle), (turn.x, turn.y, turn.z), (1, 1, turn.w), sizes
         )
-        candidate.sheet = slots.Sheet(
-            middle, np.array(axes.transposed()), tuple(sizes), kind == slots.RECTANGLE, stays=True
-        )
+        rows = np.array(axes.transposed())
+        candidate.sheet = slots.Sheet(middle, rows, tuple(sizes), stays=True)
 
     candidate.judge = judge
     return candidate
