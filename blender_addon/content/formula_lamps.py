@@ -117,7 +117,7 @@ def _part_group(parts):
         frame = (found["tangent"], found["bitangent"], found["normal"])
         at_point = here.add("value", **(found | {"wi": w.local(point, frame)}))
         placed = here.add("cone_at", **found)
-        known = found | at_point | placed | {"emphasis": on_flat["emphasis"]}
+        known = found | at_point | placed | on_flat
         lobe = here.add("lobe", **known)
         return {"BSDF": w.toon(lobe["color"], lobe["size"], w.half(placed["axis"], found["view"]))}
 

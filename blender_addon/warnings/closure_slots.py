@@ -43,11 +43,12 @@ _PRINCIPLED_SLOTS = {
 #: Numbers that Cycles keeps at a time without Open Shading Language.
 _STACK = 255
 #: How many of them a material with one model takes besides those of lamps (lamps.Budget) and of the
-#: model's formula (`numbers` in the manifest, of which at most _OF_FORMULA are not constants). With
-#: GLOG_v=3 in its environment, Blender prints the sum. With four area lamps 22 models were measured
-#: to take at most 164, `factors` 237. With all sockets linked, `charlie` takes 246 under eight,
-#: `ashikhmin_shirley` 249, and `microfacet` 238 under the seven that it has room for.
-_OF_MATERIAL, _OF_FORMULA = 85, 75
+#: model's formula: `numbers` in the manifest, of which at most _OF_FORMULA are not constants, and
+#: those of linked sockets. With GLOG_v=3 in its environment, Blender prints the sum. With four
+#: area lamps 22 models were measured to take at most 164, `factors` 237. With all sockets linked,
+#: `charlie` takes 248 under eight, `ashikhmin_shirley` 249, and `microfacet` 238 under the seven
+#: that it then has room for.
+_OF_MATERIAL, _OF_FORMULA = 85, 60
 #: How many lamps there is room for beside several models as Formula Nodes. Cycles computes what
 #: their parts have in common first, for all lamps, and keeps it. Two models were measured to take
 #: 191 under four area lamps (227 if one is `factors`), three 181 under three, four and five 179
@@ -84,8 +85,7 @@ class ClosureUsage:
     def _numbers(self):
         if self.trees > 1:
             return lamps.Budget.LAMP * _LAMPS_BESIDE.get(self.trees, 1)
-        formula = min(self.numbers, _OF_FORMULA)
-        return _STACK - _OF_MATERIAL - formula if self.trees else math.inf
+        return _STACK - _OF_MATERIAL - self.numbers if self.trees else math.inf
 
 
 def most():
@@ -122,7 +122,11 @@ def of_material(material):
             slots_per_lamp += _times(node) * a_lamp * bool(aimed_at)
             if aimed_at and model_nodes.identity(node).form == "nodes":
                 trees += 1
-                numbers = max(numbers, made.form.get("numbers", 0))
+                linked = sum(
+                    3 if s.type in ("VECTOR", "RGBA") else 1 for s in node.inputs if s.is_linked
+                )
+                own = min(made.form.get("numbers", 0), _OF_FORMULA) + linked
+                numbers = max(numbers, own)
         else:
             slots += _times(node) * _native_slots(node)
     return ClosureUsage(slots, slots_per_lamp, trees, numbers)

@@ -33,7 +33,8 @@ def few_lamps(at):
     if all(lamp.why != lamps.too_many(room) for lamp in at.of_scene.found_lamps):
         return
     if at.use.is_limited_by_stack():
-        taken = f"{at.use.trees} models as Formula Nodes, and Cycles keeps 255 numbers at a time"
+        what = f"{at.use.trees} models" if at.use.trees > 1 else "a large model"
+        taken = f"{what} as Formula Nodes, and Cycles keeps 255 numbers at a time"
     else:
         taken = f"{at.use.slots} of {most} slots of closures, and {at.use.slots_per_lamp} a lamp"
     yield {"count": room, "taken": taken}

@@ -62,6 +62,12 @@ inline constexpr double kGrid = 8;
 template <class T> auto in_grid(const T& layout) { return T(kGrid / 2) < layout; }
 template <class T> T count_of(const T& layout) { return select(in_grid(layout), T(4), abs(layout)); }
 
+/// The distance of the farthest point of a flat lamp from its middle.
+template <class T> T farthest_of(const LampSlot<T>& slot, const LampAxes<T>& lamp) {
+  const T corner = sqrt(sqr(lamp.half_across) + sqr(lamp.half_along));
+  return select(T(3.5) < slot.kind, maximum(lamp.half_across, lamp.half_along), corner);
+}
+
 /// In the unit circle, the radius of four circles that touch it and each other, and the coordinates of their middles.
 inline constexpr double kQuarter = 0.41421356;
 
@@ -215,7 +221,7 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& given, const LampAxes<
   const T radius2 = sqr(slot.shape.y);
   const T of_ball = radius2 / (distance2 + select(T(0) < abs(slot.scale.y), radius2, T(0)));
   const T of_sun = sqr(sin(minimum(abs(slot.shape.y) / T(2), T(1.5))));
-  const T diagonal = sqrt(sqr(lamp.half_across) + sqr(lamp.half_along)) * nearness;
+  const T diagonal = farthest_of(slot, lamp) * nearness;
   const T height_of_lamp = dot(lamp.away, centre), facing = height_of_lamp * nearness;
   const T narrower = minimum(lamp.half_across, lamp.half_along) * nearness;
   // Half the length of the sum of the cone's axis and the viewer's direction is the cosine between the axis and the
@@ -377,6 +383,7 @@ template <class T> ConeAside<T> cone_aside(const LampSlot<T>& slot, const LampAx
 template <class T> struct FlatPoint {
   Vec3<T> wi;  ///< unit vector to the point
   T emphasis;  ///< emphasis_at() the point
+  T bounds;    ///< if the lamp is small, the radius of a cone around all of it, with a seam; 4 if the horizon cuts it
 };
 /// The point lies in the given part. Points of neighbouring parts are mirrored, so that they are on the
 /// whole less noisy.
@@ -400,6 +407,9 @@ template <class T> FlatPoint<T> flat_point(const LampSlot<T>& slot, const LampAx
   out.wi = point * (T(1) / sqrt(distance2));
   const T cosine = maximum(dot(lamp.away, out.wi), T(0));
   out.emphasis = emphasis_at(slot, lamp, cosine, distance2, cone.of_cones) * part_of_area(cone);
+  constexpr double kCut = 4;
+  out.bounds =
+      select(T(0.999) < part_of_area(cone), farthest_of(slot, lamp) / sqrt(distance2) + T(2 * kNarrow), T(kCut));
   return out;
 }
 
@@ -441,35 +451,44 @@ template <class T> T met_part(const LampSlot<T>& slot, const LampAxes<T>& lamp, 
   return met * part_of_lamp(solid_angle, select(flat, emphasis, times_cone(cone, solid_angle)), density);
 }
 
+/// Closures with smaller weights are kept at random. Cycles drops those whose channels are below 1e-5 on average.
+inline constexpr double kLeastKept = 4e-5;
 /// Russian roulette for a closure with a small weight, which Cycles would drop: it is kept at random, with a weight
 /// increased accordingly. `u` is from 0 to 1.
 template <class T> T kept(const T& weight, const T& u) {
-  constexpr double kLeast = 1e-4;
-  const T chance = weight * T(1 / kLeast);
+  const T chance = weight * T(1 / kLeastKept);
   return select(u < chance, T(1), T(0)) / minimum(chance, T(1));
 }
 
 /// The inputs of the Toon closures, one for each cone, that carry `value`, as f cos, over it: as much of it as
-/// part_of_lamp() says. For a ball or a sun the closure may be wider than the cone.
+/// part_of_lamp() says. For a small lamp the closure may be wider than the cone.
 template <class T> struct ToonLobe {
   Rgb<T> color;
   T size;  ///< in units of 90 degrees, as in the node
 };
-/// `of_part`: the radius of a cone within a flat lamp. `room`: the radius that a cone may have without covering another
-/// lamp. `emphasis`, `density`: at the point where the value is taken.
+/// `of_part`: the radius of a cone within a flat lamp. `bounds`: FlatPoint::bounds. `index`: of the cone. `room`: the
+/// radius that a cone may have without covering another lamp. `emphasis`, `density`: at the point where the value is
+/// taken.
 template <class T> ToonLobe<T> toon_lobe(const Vec3<T>& shape, const LampCone<T>& cone, const T& of_part,
-                                         const T& emphasis, const T& density, const T& room, const Rgb<T>& value,
-                                         const T& u) {
+                                         const T& bounds, const T& index, const T& emphasis, const T& density,
+                                         const T& room, const Rgb<T>& value, const T& u) {
   constexpr double kWidened = 2e-4;
-  const T factor = emphasis * part_of_lamp(met_angle(shape, cone), emphasis, density) / cone.clear;
+  const T part = part_of_lamp(met_angle(shape, cone), emphasis, density) / cone.clear;
+  const T brightest = max_component(value) * part;
+  const T within2 = cone.of_cones / (count_of(cone.cones.layout) * T(kPi));
+  // A flat lamp whose closures would be kept at random has a single cone around all of it, if that is faint, too.
+  const auto flat = cone.flat > T(0.5);
+  const auto is_whole =
+      flat && brightest * emphasis * within2 * T(kPi) < T(kLeastKept) && brightest * sqr(bounds) * T(kPi) < T(kWidened);
+  const T factor = select(is_whole, select(index < T(0.5), part, T(0)), emphasis * part);
   const T largest = max_component(value) * factor;
   const T wide = minimum(sqrt(T(kWidened / kPi) / largest), room);
-  // A cone within its lamp has a fixed size.
-  const auto is_flat = cone.flat > T(0.5);
+  // Another cone within its lamp has a fixed size.
+  const auto is_flat = flat && !is_whole;
   const auto is_smaller = T(1.0001) < times_cone(cone, cone.of_cones);
-  const auto is_fixed = select(is_flat, T(1), select(is_smaller, T(1), T(0))) > T(0.5);
-  const T within2 = cone.of_cones / (count_of(cone.cones.layout) * T(kPi));
-  const T chord = select(is_fixed, select(is_flat, of_part, sqrt(within2)), maximum(cone.chord, wide));
+  const auto is_fixed = select(flat, select(is_whole, T(0), T(1)), select(is_smaller, T(1), T(0))) > T(0.5);
+  const T chord =
+      select(is_fixed, select(is_flat, of_part, sqrt(within2)), select(flat, bounds, maximum(cone.chord, wide)));
   const T chord2 = chord * chord;
   // A cone that was moved aside is smaller, and carries the same light.
   const T extent = select(is_fixed, within2, chord2) * T(kPi);

@@ -138,6 +138,7 @@ NodeProgram record_flat() {
                                              Expr::input("u_0"), Expr::input("u_1"));
     p.output("wi", point.wi);
     p.output("emphasis", point.emphasis);
+    p.output("bounds", point.bounds);
   });
 }
 NodeProgram record_met() {
@@ -162,8 +163,8 @@ NodeProgram record_lobe() {
     cone.drop = Expr::input("drop");
     const Expr emphasis = select(cone.flat > Expr(0.5), Expr::input("emphasis"), times_cone(cone, cone.of_cones));
     const ToonLobe<Expr> lobe =
-        toon_lobe(input3("shape"), cone, Expr::input("of_part"), emphasis, Expr::input("density"), Expr::input("room"),
-                  Rgb<Expr>::input("value"), Expr::input("u_2"));
+        toon_lobe(input3("shape"), cone, Expr::input("of_part"), Expr::input("bounds"), Expr::input("index"), emphasis,
+                  Expr::input("density"), Expr::input("room"), Rgb<Expr>::input("value"), Expr::input("u_2"));
     p.output("color", lobe.color);
     p.output("size", lobe.size);
   });
