@@ -117,9 +117,11 @@ def _part_group(parts):
         frame = (found["tangent"], found["bitangent"], found["normal"])
         at_point = here.add("value", **(found | {"wi": w.local(point, frame)}))
         placed = here.add("cone_at", **found)
-        known = found | at_point | placed | on_flat
+        pick = w.math("FRACT", w.math("MULTIPLY", found["u_2"], 64.0))
+        known = found | at_point | placed | on_flat | {"pick": pick}
         lobe = here.add("lobe", **known)
-        return {"BSDF": w.toon(lobe["color"], lobe["size"], w.half(placed["axis"], found["view"]))}
+        axis = w.mix(lobe["whole"], placed["axis"], found["aim"], True)
+        return {"BSDF": w.toon(lobe["color"], lobe["size"], w.half(axis, found["view"]))}
 
     used = ("value", "flat", "cone_at", "lobe")
     content = ["part of lamp", {name: parts.data[name] for name in used}]

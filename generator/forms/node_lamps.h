@@ -464,14 +464,15 @@ template <class T> T kept(const T& weight, const T& u) {
 /// part_of_lamp() says. For a small lamp the closure may be wider than the cone.
 template <class T> struct ToonLobe {
   Rgb<T> color;
-  T size;  ///< in units of 90 degrees, as in the node
+  T size;   ///< in units of 90 degrees, as in the node
+  T whole;  ///< 1 if it is the single cone around all of a small flat lamp, otherwise 0
 };
-/// `of_part`: the radius of a cone within a flat lamp. `bounds`: FlatPoint::bounds. `index`: of the cone. `room`: the
-/// radius that a cone may have without covering another lamp. `emphasis`, `density`: at the point where the value is
-/// taken.
+/// `of_part`: the radius of a cone within a flat lamp. `bounds`: FlatPoint::bounds. `index`: of the cone. `pick`: a
+/// random number in [0, 1), which picks the part whose value a small lamp has. `room`: the radius that a cone may have
+/// without covering another lamp. `emphasis`, `density`: at the point where the value is taken.
 template <class T> ToonLobe<T> toon_lobe(const Vec3<T>& shape, const LampCone<T>& cone, const T& of_part,
-                                         const T& bounds, const T& index, const T& emphasis, const T& density,
-                                         const T& room, const Rgb<T>& value, const T& u) {
+                                         const T& bounds, const T& index, const T& pick, const T& emphasis,
+                                         const T& density, const T& room, const Rgb<T>& value, const T& u) {
   constexpr double kWidened = 2e-4;
   const T part = part_of_lamp(met_angle(shape, cone), emphasis, density) / cone.clear;
   const T brightest = max_component(value) * part;
@@ -480,7 +481,9 @@ template <class T> ToonLobe<T> toon_lobe(const Vec3<T>& shape, const LampCone<T>
   const auto flat = cone.flat > T(0.5);
   const auto is_whole =
       flat && brightest * emphasis * within2 * T(kPi) < T(kLeastKept) && brightest * sqr(bounds) * T(kPi) < T(kWidened);
-  const T factor = select(is_whole, select(index < T(0.5), part, T(0)), emphasis * part);
+  const T picked = pick * count_of(cone.cones.layout) - index;
+  const auto is_picked = T(0) <= picked && picked < T(1);
+  const T factor = select(is_whole, select(is_picked, part, T(0)), emphasis * part);
   const T largest = max_component(value) * factor;
   const T wide = minimum(sqrt(T(kWidened / kPi) / largest), room);
   // Another cone within its lamp has a fixed size.
@@ -493,6 +496,7 @@ template <class T> ToonLobe<T> toon_lobe(const Vec3<T>& shape, const LampCone<T>
   // A cone that was moved aside is smaller, and carries the same light.
   const T extent = select(is_fixed, within2, chord2) * T(kPi);
   ToonLobe<T> out;
+  out.whole = select(is_whole, T(1), T(0));
   // The angle 2 asin(chord / 2), with a relative error of 1e-4.
   out.size = chord * (T(2 / kPi) +
                       chord2 * (T(2 / kPi / 24) + chord2 * (T(2 / kPi * 3 / 640) + chord2 * T(2 / kPi * 5 / 7168))));

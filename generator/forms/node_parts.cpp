@@ -162,11 +162,12 @@ NodeProgram record_lobe() {
     cone.cones.layout = Expr::input("layout");
     cone.drop = Expr::input("drop");
     const Expr emphasis = select(cone.flat > Expr(0.5), Expr::input("emphasis"), times_cone(cone, cone.of_cones));
-    const ToonLobe<Expr> lobe =
-        toon_lobe(input3("shape"), cone, Expr::input("of_part"), Expr::input("bounds"), Expr::input("index"), emphasis,
-                  Expr::input("density"), Expr::input("room"), Rgb<Expr>::input("value"), Expr::input("u_2"));
+    const ToonLobe<Expr> lobe = toon_lobe(input3("shape"), cone, Expr::input("of_part"), Expr::input("bounds"),
+                                          Expr::input("index"), Expr::input("pick"), emphasis, Expr::input("density"),
+                                          Expr::input("room"), Rgb<Expr>::input("value"), Expr::input("u_2"));
     p.output("color", lobe.color);
     p.output("size", lobe.size);
+    p.output("whole", lobe.whole);
   });
 }
 NodeProgram record_rest() {

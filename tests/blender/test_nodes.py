@@ -312,6 +312,24 @@ def test_a_floor_beside_a_lamp_that_is_half_below_it(extension, empty, light):
     assert noise < 0.05, noise  # without the closures 0.1 and more
 
 
+def small_strip(scene):
+    add_lamp(
+        scene, "AREA", "Area", (1, -4, 2), (1.1, 0, 0.24), energy=100,
+        shape="RECTANGLE", size=0.02, size_y=0.08,
+    )  # fmt: skip
+
+
+def test_a_small_strip(extension):
+    """Closures within it are so faint that they would be kept at random. So it has a single cone
+    around it, about its middle: about the middle of a part, 7 % of the light would be lost."""
+    a, b = (blocks_of(extension, "oren_nayar", {}, f, small_strip, 64) for f in ("nodes", "aimed"))
+    off, error, _ = difference(a, b)
+    noise = (a.var(0, ddof=1).sum() / (a.mean(0) ** 2).sum()) ** 0.5
+    print(f"{100 * off:+.2f} ± {100 * error:.2f} %, noise of blocks {noise:.2e}")
+    assert abs(off) < 4.5 * error + 1e-3
+    assert noise < 0.01, noise
+
+
 @pytest.mark.parametrize(
     ("model", "mean_limit", "block_limit"),
     [("cook_torrance", 0.01, 0.05), ("radziszewski_alda", 0.07, 0.15)],
