@@ -43,7 +43,7 @@ class Budget(NamedTuple):
     numbers: float = math.inf
 
     #: Numbers that a lamp takes, and those that its cones add if it has several.
-    LAMP, CONES = 12.6, 8.0
+    LAMP, CONES = 12.6, 18.0
 
     def lamps(self):
         """For how many lamps it suffices."""

@@ -44,10 +44,10 @@ _PRINCIPLED_SLOTS = {
 _STACK = 255
 #: How many of them a material with one model takes besides those of lamps (lamps.Budget) and of the
 #: model's formula: `numbers` in the manifest, of which at most _OF_FORMULA are not constants, and
-#: those of linked sockets. With GLOG_v=3 in its environment, Blender prints the sum. With four
-#: area lamps 22 models were measured to take at most 164, `factors` 237. With all sockets linked,
-#: `charlie` takes 248 under eight, `ashikhmin_shirley` 249, and `microfacet` 238 under the seven
-#: that it then has room for.
+#: those of linked sockets. With GLOG_v=3 in its environment, Blender prints the sum. 22 models were
+#: measured to take at most 192 under four area lamps and 243 under eight, `factors` 234 and 247.
+#: With all sockets linked, `radziszewski_alda` takes 253 under eight, and `microfacet` 239 under
+#: the seven that it then has room for.
 _OF_MATERIAL, _OF_FORMULA = 85, 60
 #: How many lamps there is room for beside several models as Formula Nodes. Cycles computes what
 #: their parts have in common first, for all lamps, and keeps it. Two models were measured to take
