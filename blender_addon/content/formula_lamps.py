@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The lamps of Formula Nodes: how each looks from the shading point, which of them get closures,
-and the Toon BSDFs that carry their light (generator/forms/node_lamps.h has the formulas)."""
+and the Toon BSDFs that carry their light (generator/forms/node_cones.h and node_lamps.h have the
+formulas)."""
 
 from ..lamps import slots
 from . import svm_constants
@@ -40,8 +41,6 @@ _PARTS = [
     {"index": float(i), "side_across": 2.0 * (i % 2) - 1, "side_along": 2.0 * (i // 2) - 1}
     for i in range(slots.MOST_CONES)
 ]
-#: Number of cones in two rows (generator/forms/node_lamps.h, kGrid).
-_GRID = 8.0
 #: Larger than the angle between any two directions.
 _FAR = 4.0
 
@@ -136,8 +135,7 @@ def _lamp_group(parts, cones):
 
     def fill(w, found):
         closures = []
-        is_grid = w.math("GREATER_THAN", found["layout"], _GRID / 2)
-        count = w.mix(is_grid, w.math("ABSOLUTE", found["layout"]), 4.0)
+        count = parts.on(w, found).add("count", layout=found["layout"])["count"]
         for i, place in enumerate(_PARTS[:cones]):
             closure = add_group(w, part, found | place, f"part {i}")["BSDF"]
             if i > 0:
@@ -148,7 +146,7 @@ def _lamp_group(parts, cones):
             closures.append(closure)
         return {"BSDF": w.shown(found["lit"], w.sum(closures))}
 
-    content = ["lamp", cones, _GRID, part[PART]]
+    content = ["lamp", cones, parts.data["count"], part[PART]]
     return make_group(f"{parts.title}: lamp", content, inputs, [["BSDF", "SHADER"]], fill)
 
 

@@ -288,7 +288,7 @@ def _change_form(group, form, room_needed):
         else:
             room = room_needed() if form.lamps else lamps.WHOLE
             if before and ROOM in tag:
-                room = room.joined(lamps.Room(*tag[ROOM]))
+                room = room.joined(_room_of(tag))
             _set_room(group, room)
 
             def group_of(inner):

@@ -15,10 +15,8 @@ def _concerns(update, scene):
     """Whether an update of the dependency graph may change the contents of the slots."""
     item, survey = update.id, filling.memory.survey
     if isinstance(item, bpy.types.Object):
-        kind, crowded = (
-            kinds.of_object(item),
-            len(survey.candidates) > filling.memory.budget.lamps(),
-        )
+        kind = kinds.of_object(item)
+        crowded = len(survey.candidates) > filling.memory.budget.lamps()
         if kind is not None and kind.is_changed(update, survey, crowded):
             return True
         if item.original.name_full in survey.instancers:

@@ -149,7 +149,7 @@ class Sheet:
     stays: bool
 
     def cones(self):
-        """How many cones it should have (generator/forms/node_lamps.h)."""
+        """How many cones it should have (generator/forms/node_cones.h)."""
         return MOST_CONES if min(self.sizes) > 0 else 1
 
     def is_beside(self, other):

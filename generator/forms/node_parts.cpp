@@ -105,6 +105,9 @@ NodeProgram record_cone() {
     p.output("moved", cone.cones.moved);
   });
 }
+NodeProgram record_count() {
+  return recorded([](Program& p) { p.output("count", count_of(Expr::input("layout"))); });
+}
 NodeProgram record_cone_at() {
   return recorded([](Program& p) {
     LampCone<Expr> cone;

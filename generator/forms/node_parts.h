@@ -19,6 +19,7 @@ print::NodeProgram record_raise();
 print::NodeProgram record_axes();
 print::NodeProgram record_cone();
 /// The cone of a lamp with this index.
+print::NodeProgram record_count();
 print::NodeProgram record_cone_at();
 print::NodeProgram record_aside();
 print::NodeProgram record_flat();

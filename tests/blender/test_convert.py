@@ -453,6 +453,15 @@ def test_a_plastic_follows_its_linked_inputs(extension, convert, empty, socket, 
 CLEAR = {"Transmission_Weight": 1.0, "Roughness": 0.0, "IOR": 1.4}
 
 
+def ball_before_a_sky(scene, material, size, samples, osl):
+    """A ball that light may pass through, before a sky whose colour is its direction."""
+    helpers.sphere_scene(scene, material, size=size, samples=samples)
+    tree = scene.world.node_tree
+    back = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeBackground")
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"], back.inputs["Color"])
+    scene.cycles.shading_system, scene.cycles.max_bounces = osl, 12
+
+
 @pytest.mark.parametrize("osl", [False, True])
 @pytest.mark.parametrize(
     ("color", "more"),
@@ -464,11 +473,7 @@ CLEAR = {"Transmission_Weight": 1.0, "Roughness": 0.0, "IOR": 1.4}
 def test_a_picture_of_clear_plastic_is_that_of_glass(extension, convert, empty, color, more, osl):
     """A Principled node that transmits everything: a ball before a sky of two colours."""
     material, node = material_of("principled", "GGX", Base_Color=color, **CLEAR, **more)
-    helpers.sphere_scene(empty, material, size=24, samples=512)
-    tree = empty.world.node_tree
-    back = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeBackground")
-    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"], back.inputs["Color"])
-    empty.cycles.shading_system, empty.cycles.max_bounces = osl, 12
+    ball_before_a_sky(empty, material, 24, 512, osl)
 
     def ball():
         """Blocks of pixels of the ball, for less noise where the alpha chooses paths."""
@@ -530,11 +535,7 @@ def tinted_glass(kind, color):
 def test_tinted_glass_is_the_same_block_by_block(extension, convert, empty, kind, color, osl):
     """A Glass node tints what it reflects and refracts; a Principled node what it refracts."""
     material, node = tinted_glass(kind, color)
-    helpers.sphere_scene(empty, material, size=48, samples=256)
-    tree = empty.world.node_tree
-    back = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeBackground")
-    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"], back.inputs["Color"])
-    empty.cycles.shading_system, empty.cycles.max_bounces = osl, 12
+    ball_before_a_sky(empty, material, 48, 256, osl)
 
     def blocks():
         """Means of 8 x 8 pixels."""

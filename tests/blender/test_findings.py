@@ -282,12 +282,11 @@ def test_lamps_that_take_light_are_aimed_at(extension, empty):
 # ---- materials of another file -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("with_object", [False, True])
-def test_linked_materials_aim_at_their_own_files_lamps(extension, empty, tmp_path, with_object):
-    material = ball(extension, empty)
-    add_lamp(empty, name="There", location=(5, 0, 5), energy=100, shadow_soft_size=0.1)
+def linked_from_a_file(extension, folder, material, objects=()):
+    """Saves the open file as library.blend, and links the material and objects with these names
+    from it into a new one. Returns its scene, the objects and the material."""
     bpy.context.view_layer.update()
-    path = tmp_path / "library.blend"
+    path = folder / "library.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     name = material.name
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
@@ -295,15 +294,23 @@ def test_linked_materials_aim_at_their_own_files_lamps(extension, empty, tmp_pat
     extension.scene_loader.apply_clean_settings(scene, max_bounces=0)
     extension.api.enable_osl(scene)
     with bpy.data.libraries.load(str(path), link=True) as (_, to):
-        to.materials, to.objects = [name], ["Sphere", "There"] if with_object else []
+        to.materials, to.objects = [name], [*objects]
+    return scene, to.objects, to.materials[0]
+
+
+@pytest.mark.parametrize("with_object", [False, True])
+def test_linked_materials_aim_at_their_own_files_lamps(extension, empty, tmp_path, with_object):
+    material = ball(extension, empty)
+    add_lamp(empty, name="There", location=(5, 0, 5), energy=100, shadow_soft_size=0.1)
+    objects = ["Sphere", "There"] if with_object else []
+    scene, linked, material = linked_from_a_file(extension, tmp_path, material, objects)
     if with_object:
-        item, there = to.objects
+        item, there = linked
         scene.collection.objects.link(item)
         scene.collection.objects.link(there)
         material = item.active_material
         assert found(extension, material, scene) == {}, "its lamp is here too"
     else:
-        material = to.materials[0]
         item = helpers.add_sphere(scene, material)
     bpy.context.view_layer.objects.active = item
     add_lamp(scene, name="Here", location=(1, -2, 4), energy=100, shadow_soft_size=0.1)
@@ -341,17 +348,7 @@ def test_a_lamp_like_that_of_the_linked_file_is_none_to_warn_of(extension, empty
     kind, inputs = LIKE[kind]
     material = ball(extension, empty)
     add_lamp(empty, kind, name="There", **inputs)
-    bpy.context.view_layer.update()
-    path = tmp_path / "library.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    name = material.name
-    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    scene = bpy.context.scene
-    extension.scene_loader.apply_clean_settings(scene, max_bounces=0)
-    extension.api.enable_osl(scene)
-    with bpy.data.libraries.load(str(path), link=True) as (_, to):
-        to.materials = [name]
-    (material,) = to.materials
+    scene, _, material = linked_from_a_file(extension, tmp_path, material)
     bpy.context.view_layer.objects.active = helpers.add_sphere(scene, material)
     here = add_lamp(scene, kind, name="Here", **inputs)
     bpy.context.view_layer.update()

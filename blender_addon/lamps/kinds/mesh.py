@@ -16,7 +16,7 @@ from .kind import Kind
 #: the lamp separately. So a mesh must fill its ball well, as a cube does, or look small; a mesh
 #: that looks large must be a ball; and wide ones are left to random rays. Angular radii in radians.
 _FILLS_BALL, _IS_BALL = 0.5, 0.95
-#: The scale of a ball that stands for a mesh (generator/forms/node_lamps.h).
+#: The scale of a ball that stands for a mesh (generator/forms/node_cones.h).
 _NO_LAMP = 0.0, 0.0, 1.0
 _LOOKS_SMALL, _LOOKS_LARGE, _LOOKS_WIDE = 0.03, 0.3, 0.4
 #: The same for rectangles and ellipses: the fraction of its bounding rectangle that a flat mesh

@@ -12,7 +12,7 @@ _NEW = 1000, 0.1
 
 def as_ball(light, place, turn, scale):
     """slots.placed() as balls have it: the second scale is 0 for a sphere, while lamps with soft
-    falloff are disks (generator/forms/node_lamps.h)."""
+    falloff are disks (generator/forms/node_cones.h)."""
     return place, turn, scale if light.use_soft_falloff else (scale[0], 0.0, scale[2])
 
 
