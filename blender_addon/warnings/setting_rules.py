@@ -120,12 +120,13 @@ def _shows_passes(scene):
 
 
 def albedo_passes(at):
-    """A view layer keeps the diffuse colour or Denoising Data, in which closures count that add up
-    to more than the material reflects."""
+    """A view layer keeps the diffuse or the glossy colour or Denoising Data, in which closures count
+    that add up to more than the material reflects."""
     # If only Cycles' own denoiser reads them, the picture is within 0.1 % of the one without
     # passes.
     layers = at.scene.view_layers
-    return when(_shows_passes(at.scene) or any(v.use_pass_diffuse_color for v in layers))
+    colours = any(v.use_pass_diffuse_color or v.use_pass_glossy_color for v in layers)
+    return when(_shows_passes(at.scene) or colours)
 
 
 def albedo_passes_mirror(at):

@@ -138,7 +138,17 @@ bpy.ops.render.render(animation=True)
 
 def render_without_the_extension(blend, frame, folder):
     """Renders a frame of a saved file in a separate Blender without the extension."""
-    environment = os.environ | {"BLENDER_USER_RESOURCES": str(folder / "nothing")}
+    log_without_the_extension(blend, folder, frame)
+    return read_picture(folder / f"{frame:04}.exr")
+
+
+def log_without_the_extension(blend, folder, frame=1):
+    """What Cycles says while it renders a frame of a saved file in a separate Blender."""
+    environment = os.environ | {
+        "BLENDER_USER_RESOURCES": str(folder / "nothing"),
+        "GLOG_v": "3",
+        "GLOG_logtostderr": "1",
+    }
     done = subprocess.run(
         [sys.executable, "-c", FACTORY_RENDER, blend, str(frame), folder],
         env=environment,
@@ -146,7 +156,7 @@ def render_without_the_extension(blend, frame, folder):
         text=True,
     )
     assert done.returncode == 0, done.stderr
-    return read_picture(folder / f"{frame:04}.exr")
+    return done.stderr
 
 
 def render_passes(scene):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the extension does when the shaders of a material take most of Cycles' 64 closure slots."""
 
+import re
 from importlib import import_module
 
 import bpy
@@ -139,3 +140,56 @@ def test_several_models_as_formula_nodes_are_not_black(extension, cpu, models, r
     cpu.render.resolution_x = cpu.render.resolution_y = 16
     centre = helpers.render(cpu)[6:10, 6:10, :3]
     assert centre.mean() > 0.1  # parts of the ball are dark, under lamps alone
+
+
+# ---- numbers on SVM's stack ----------------------------------------------------------------------
+
+#: SVM_STACK_SIZE in Cycles. A material that needs more is black.
+STACK = 255
+
+
+@pytest.mark.skipif(bpy.app.version >= (5, 0, 0), reason="Blender 4.5 logs the use of the stack")
+@pytest.mark.parametrize(
+    ("count", "linked"),
+    [
+        (8, False),
+        pytest.param(4, False, marks=pytest.mark.long),
+        pytest.param(8, True, marks=pytest.mark.long),
+    ],
+)
+def test_every_model_fits_the_stack_under_area_lamps(extension, empty, tmp_path, count, linked):
+    """Area lamps take the most numbers: each has up to four cones. With a texture on every socket
+    those of the textures come on top."""
+    names = [m for m, e in extension.api.models().items() if "nodes" in e["representations"]]
+    empty.render.engine, empty.cycles.shading_system = "CYCLES", False
+    empty.cycles.samples = 1
+    empty.render.resolution_x = empty.render.resolution_y = 8
+    helpers.add_camera(empty, location=(0, 0, 9))
+    for i in range(count):
+        angle = 2 * np.pi * i / 8
+        location = (5 * np.cos(angle), 5 * np.sin(angle), 3)
+        helpers.add_lamp(empty, "AREA", f"Lamp{i}", location, (0.5, 0.2 * i, 0), size=1.0)
+    materials = [extension.api.new_material(name, "nodes") for name in names]
+    for material in materials:
+        put(empty, material)
+        if linked:
+            _link_textures(material)
+    extension.api.see_lamps(empty)
+    path = tmp_path / "saved.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    log = helpers.log_without_the_extension(path, tmp_path)
+    used = [int(n) for n in re.findall(r"Peak stack usage: *(\d+)", log)]
+    assert len(used) >= len(names), log[-2000:]
+    assert max(used) > STACK / 2  # of models with formulas under all lamps
+    assert "stack space" not in log
+    assert max(used) < STACK
+
+
+def _link_textures(material):
+    """Links a texture of its own to each socket of the model's node."""
+    tree = material.node_tree
+    (group,) = (n for n in tree.nodes if n.bl_idname == "ShaderNodeGroup")
+    for i, socket in enumerate(group.inputs):
+        texture = tree.nodes.new("ShaderNodeTexNoise")
+        texture.inputs["Scale"].default_value = i + 1
+        tree.links.new(texture.outputs["Color"], socket)

@@ -988,6 +988,7 @@ def test_warning_albedo_passes(extension, empty):
     layer = empty.view_layers[0]
     for setting, owner in (
         ("use_pass_diffuse_color", layer),
+        ("use_pass_glossy_color", layer),
         ("denoising_store_passes", layer.cycles),
     ):
         assert codes(extension, material, empty) == []
@@ -1052,6 +1053,24 @@ def _strength_of(emission):
 def _sampled_by_chance(emission, material):
     _strength_of(emission).default_value = 2.0
     material.cycles.emission_sampling = "NONE"
+
+
+@pytest.mark.parametrize(
+    ("model", "expected"),
+    [
+        ("ashikhmin_shirley", ["albedo_passes"]),
+        ("microfacet", ["albedo_passes", "filter_glossy"]),
+        ("cook_torrance", ["filter_glossy"]),
+        ("radziszewski_alda", []),
+    ],
+)
+def test_warnings_of_formula_nodes_by_their_base(extension, empty, model, expected):
+    """Cones with ramps and rough facets are too bright in passes; Filter Glossy blurs facets."""
+    material = clean(extension, empty, model, "nodes")
+    assert codes(extension, material, empty) == []
+    empty.view_layers[0].use_pass_glossy_color = True
+    empty.cycles.blur_glossy = 1.0
+    assert sorted(codes(extension, material, empty)) == expected
 
 
 def test_denoising_at_its_defaults_is_no_reason_to_warn(extension, empty):
