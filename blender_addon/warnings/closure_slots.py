@@ -44,11 +44,12 @@ _PRINCIPLED_SLOTS = {
 _STACK = 255
 #: How many of them a material with one model takes besides those of lamps (lamps.Budget) and of the
 #: model's formula: `numbers` in the manifest, of which at most _OF_FORMULA are not constants, and
-#: those of linked sockets. With GLOG_v=3 in its environment, Blender prints the sum. 22 models were
-#: measured to take at most 192 under four area lamps and 243 under eight, `factors` 234 and 247.
-#: With all sockets linked, `radziszewski_alda` takes 253 under eight, and `microfacet` 239 under
-#: the seven that it then has room for.
-_OF_MATERIAL, _OF_FORMULA = 85, 60
+#: those of linked sockets, each with a part of what is computed from it. With GLOG_v=3 in its
+#: environment, Blender prints the sum. 22 models were measured to take at most 192 under four area
+#: lamps and 243 under eight, `factors` 234 and 247. With all sockets linked, `radziszewski_alda`
+#: takes 253 under eight, `microfacet` 239 under the seven that it then has room for, and `factors`,
+#: which has 22 colours, 242 under one.
+_OF_MATERIAL, _OF_FORMULA, _LINKED = 85, 60, 1.2
 #: How many lamps there is room for beside several models as Formula Nodes. Cycles computes what
 #: their parts have in common first, for all lamps, and keeps it. Two models were measured to take
 #: 201 under four area lamps (233 if one is `factors`), three 185 under three, four and five 179
@@ -64,7 +65,7 @@ class ClosureUsage:
     slots: int
     slots_per_lamp: int
     trees: int
-    numbers: int = 0
+    numbers: float = 0
 
     def budget(self):
         """What it leaves for lamps; None if nothing aims at lamps."""
@@ -125,7 +126,7 @@ def of_material(material):
                 linked = sum(
                     3 if s.type in ("VECTOR", "RGBA") else 1 for s in node.inputs if s.is_linked
                 )
-                own = min(made.form.get("numbers", 0), _OF_FORMULA) + linked
+                own = min(made.form.get("numbers", 0), _OF_FORMULA) + _LINKED * linked
                 numbers = max(numbers, own)
         else:
             slots += _times(node) * _native_slots(node)

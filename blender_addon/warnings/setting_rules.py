@@ -120,8 +120,8 @@ def _shows_passes(scene):
 
 
 def albedo_passes(at):
-    """A view layer keeps the diffuse or the glossy colour or Denoising Data, in which closures count
-    that add up to more than the material reflects."""
+    """A view layer keeps the diffuse or the glossy colour or Denoising Data, in which the closures
+    of the material add up to more than it reflects."""
     # If only Cycles' own denoiser reads them, the picture is within 0.1 % of the one without
     # passes.
     layers = at.scene.view_layers
