@@ -267,6 +267,17 @@ def _as_seen(values):
     return np.concatenate([place, turn[:, 2], np.abs(turn[:, 0]), sides, [shape[0], shape[1] < 0]])
 
 
+def shown_with(values, item):
+    """The numbers of a lamp that are those of an empty slot in frames in which the object is not
+    rendered. Beyond that, nothing changes the shape's number while the extension does not run."""
+    shape = _now(values[_SHAPE])
+    return (
+        *values[:_SHAPE],
+        Driven(item, "hide_render", EMPTY - shape, shape),
+        *values[_SHAPE + 1 :],
+    )
+
+
 def is_same_lamp(a, b):
     """Whether the numbers of two slots are of lamps that look the same: of the same object, or of
     another one at the same place."""

@@ -44,6 +44,11 @@ def _curves(owner):
     return {curve.as_pointer(): curve for curve in curves}.values()
 
 
+def animates(owner, path):
+    """Whether an F-curve or a driver animates this property of a data-block."""
+    return any(curve.data_path == path for curve in _curves(owner))
+
+
 def _targets(tree):
     """Yields (curve, its data-block, the object it animates, the property's name), for everything
     in a tree."""

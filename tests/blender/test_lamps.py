@@ -304,6 +304,32 @@ def test_animation_renaming_and_removing(ball, empty):
     assert len(slots(empty)) == 1
 
 
+def test_a_lamp_that_animation_hides_has_an_empty_slot(ball, empty):
+    """At its place another lamp may shine in its stead, which it must not make noisy. Drivers do
+    this, so that a farm without the extension renders the same."""
+    pair = [add_lamp(empty, "AREA", name, size=1.0) for name in ("Day", "Night")]
+    pair += [add_lamp(empty, "SPOT", name, location=(3, 0, 0)) for name in ("Dusk", "Dawn")]
+    for i, lamp in enumerate(pair):
+        for frame in (1, 11):
+            lamp.hide_render = (frame == 11) == (i % 2 == 0)
+            lamp.keyframe_insert("hide_render", frame=frame)
+
+    def kinds():
+        group = bpy.data.node_groups["brdfc Lamps"]
+        group = group.evaluated_get(empty.view_layers[0].depsgraph)
+        codes = [group.nodes[f"LampShape{i}"].inputs[0].default_value for i in range(1, 9)]
+        return [int(code % 8) for code in codes]
+
+    for _ in range(2):
+        empty.view_layers[0].update()
+    found = []
+    for frame in (1, 11, 1):
+        empty.frame_set(frame)
+        found.append(kinds())
+        assert sorted(found[-1]) == [0] * 6 + [1, 3]
+    assert found[0] == found[2] != found[1]
+
+
 def test_undo(ball, empty):
     add_lamp(empty, "POINT", "Key")
     bpy.context.view_layer.update()

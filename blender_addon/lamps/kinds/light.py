@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from ...trees import animation
 from .. import emission, slots
 from .kind import Kind
 
@@ -152,9 +153,12 @@ class Light(Kind, ABC):
         # other objects, so that the lobe must carry all of its light.
         sign = 1.0 if has_importance(light) and light.use_shadow else -1.0
         sizeless = self.is_sizeless(light)
+        values = self.slot(light, slots.placed(item, matrix), sign)
+        if item is not None and animation.animates(item, "hide_render"):
+            values = slots.shown_with(values, item)
         return slots.Candidate(
             name,
-            self.slot(light, slots.placed(item, matrix), sign),
+            values,
             partial(self.irradiance, light, matrix, self.power(light)),
             self.angular_size(light, matrix),
             sizeless=sizeless,
