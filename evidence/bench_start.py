@@ -21,9 +21,8 @@ os.environ["BLENDER_USER_RESOURCES"] = _FOLDER.name
 
 import bpy  # noqa: E402
 
-SCRIPT_FORMS = ("exact", "aimed", "fitted", "sampled")
-#: Forms of the table. *auto* is what a material gets with Open Shading Language off.
-FORMS = ("auto", *SCRIPT_FORMS)
+#: What a material gets with Open Shading Language off.
+AUTO = "auto"
 
 
 def arguments():
@@ -83,21 +82,24 @@ def seconds(scene, materials):
     return time.process_time() - begin
 
 
+def script_forms(entry):
+    """The forms of a model that need Open Shading Language."""
+    return [form for form, made in entry["representations"].items() if made.get("shader")]
+
+
 def measured(api, model, options):
     """{form: CPU seconds for each material}, including that of the Principled BSDF."""
     scene = new_file(options.materials)
     originals = {"principled": bpy.data.materials.new("Principled")}
     originals["principled"].use_nodes = True
-    for form in FORMS:
-        try:
-            originals[form] = api.new_material(model, representation=form)
-        except ValueError:  # the model has no such form
-            continue
+    scripts = script_forms(api.models()[model])
+    for form in (AUTO, *scripts):
+        originals[form] = api.new_material(model, representation=form)
     sets = {f: [varied(m) for _ in range(options.materials)] for f, m in originals.items()}
     least = dict.fromkeys(["empty", *sets], float("inf"))
     for _ in range(options.repeat):
         for form, materials in [("empty", [None] * options.materials), *sets.items()]:
-            scene.cycles.shading_system = form in SCRIPT_FORMS
+            scene.cycles.shading_system = form in scripts
             least[form] = min(least[form], seconds(scene, materials))
     empty = least.pop("empty")
     return {form: (s - empty) / options.materials for form, s in least.items()}
@@ -107,9 +109,13 @@ def main():
     options = arguments()
     random.seed(1)
     api = install(options.extension)
-    columns = ("principled", *FORMS)
+    models = api.models()
+    if unknown := set(options.model or ()) - set(models):
+        sys.exit(f"no model is named {', '.join(sorted(unknown))}")
+    columns = list(dict.fromkeys(f for entry in models.values() for f in script_forms(entry)))
+    columns = ["principled", AUTO, *columns]
     print("model," + ",".join(columns), flush=True)
-    for model in options.model or list(api.models()):
+    for model in options.model or list(models):
         found = measured(api, model, options)
         row = [f"{found[c]:.3f}" if c in found else "" for c in columns]
         print(",".join([model, *row]), flush=True)
