@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A lamp of the aimed form, as seen from a shading point: a flat patch, the part of it above a plane, and the part whose
-// light cone includes the point. aimed.h says what closures carry over it. node_cones.h has the same for the form made of
-// nodes.
+// A lamp of the aimed form, as seen from a shading point: a flat patch, the part of it above a plane, and the part
+// whose light cone includes the point. aimed.h says what closures carry over it. node_cones.h has the same for the form
+// made of nodes.
 //
 // Directions and lamps are in the local frame of the shader: z is the normal on the viewer's side.
 #pragma once
