@@ -86,10 +86,11 @@ def schlick_like(f0, tint=1.0):
     c = np.linspace(0.2, 1, 33)
     wanted = native_bsdf.tinted_dielectric(native_bsdf.dielectric(f0, c), f0, (tint,))[:, 0]
     f0s = (f0 * tint * np.linspace(0.7, 1.3, 61))[:, None, None]
-    tints = np.linspace(0.7, 1, 31)[:, None]
+    tints = np.linspace(0, 1, 101)[:, None]
     tinted = native_bsdf.TINTED
     strongest = c * (1 - c) ** 6 / (tinted * (1 - tinted) ** 6)
     found = (f0s + (1 - f0s) * (1 - c) ** 5) * (1 - (1 - tints) * strongest)
-    off = np.abs(found / wanted - 1).mean(-1)
+    # A tint of 0 reflects nothing at normal incidence.
+    off = (np.abs(found - wanted) / (wanted + 1e-3)).mean(-1)
     i, j = np.unravel_index(np.argmin(off), off.shape)
     return float(f0s[i, 0, 0]), float(tints[j, 0])
