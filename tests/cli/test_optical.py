@@ -287,7 +287,12 @@ def test_a_scene_states_the_thickness(tmp_path):
         assert got["attenuation"] == pytest.approx(np.clip(told["transmittance"], 1e-4, 1))
     # A surface without an inside does not absorb.
     assert "attenuation" not in resolved(model="fresnel_dielectric", optical="green.csv")
-    assert set(resolved(model="glass", optical="silica")) == {"ior", "dispersion"}
+    # Without k nothing is absorbed, unless the scene says so.
+    clear = resolved(model="glass", optical="silica")
+    assert set(clear) == {"ior", "dispersion", "attenuation"} and clear["attenuation"] == [1, 1, 1]
+    green = {"attenuation": [0.2, 0.9, 0.3], "density": 2}
+    found = resolved(model="glass", optical="silica", parameters=green)
+    assert {name: found[name] for name in green} == green
     for material, expected in (
         ({"optical": "silica", "thickness": 1}, "silica has no k to absorb by"),
         ({"thickness": 1}, 'materials.m.thickness: expected "optical" beside it'),
@@ -454,7 +459,8 @@ def test_a_scene_names_a_substance_or_a_file(tmp_path):
     gold = optical("gold")
     of_channels = [found["a"]["parameters"][f"{q}_{c}"] for q in "nk" for c in "rgb"]
     assert of_channels == pytest.approx([*gold["n"], *gold["k"]])
-    assert found["b"]["parameters"] == {"ior": 1.5, "dispersion": 0, "density": 0}
+    clear = {"ior": 1.5, "dispersion": 0, "density": 0, "attenuation": [1, 1, 1]}
+    assert found["b"]["parameters"] == clear
     # 20 divided by the Abbe number.
     assert resolved(b={"model": "fresnel_dielectric", "optical": "sf11"}).returncode == 0
     found = json.loads((tmp_path / "out" / "scene.json").read_text())["materials"]
