@@ -27,7 +27,7 @@ def rest(f0, tint, multiscatter, roughness=None):
     roughnesses = _ROUGHNESSES if roughness is None else np.array([roughness])
     views = np.stack([np.sqrt(1 - _COSINES**2), 0 * _COSINES, _COSINES], -1)
     plastic = native_bsdf.Native("principled", (1.0, 1.0, 1.0), f0=f0, multiscatter=multiscatter)
-    plastic = replace(plastic, tint=(tint,) * 3)
+    plastic = replace(plastic, tint=(tint,))  # the only channel that matters
     nodes = [replace(plastic, roughness=r) for r in roughnesses]
     left = 1 - np.stack([native_bsdf.view_terms(node, views).taken for node in nodes])
     degree = _DEGREE_ROUGHNESS if roughness is None else 0
@@ -52,7 +52,8 @@ def rest_of_share(native, at, least):
     (1 - cos)^i share^j. `least`: the lowest share but 0 to which it is fitted."""
     shares = np.concatenate([[0.0], np.linspace(least, 1, 12)])
     views = np.stack([np.sqrt(1 - _COSINES**2), 0 * _COSINES, _COSINES], -1)
-    nodes = [at(replace(native, color=(1.0, 1.0, 1.0)), share) for share in shares]
+    native = replace(native, color=(1.0, 1.0, 1.0), tint=(max(native.tint),))
+    nodes = [at(native, share) for share in shares]
     left = 1 - np.stack([native_bsdf.view_terms(node, views).taken for node in nodes])
     of_view = (1 - _COSINES)[:, None] ** np.arange(_DEGREE + 1)
     of_share = shares[:, None] ** np.arange(_DEGREE_SHARE + 1)

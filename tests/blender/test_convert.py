@@ -369,6 +369,22 @@ def test_a_plan_computes_interreflection_once(extension, convert, empty, monkeyp
     assert 0 < len(calls) < 8
 
 
+def test_a_plan_samples_facets_once_for_each_set_of_views(extension, convert, empty, monkeypatch):
+    """Albedos of one surface share the samples: of its plan's views, of those of the layer's
+    polynomial, of the mean over all views, and of the light directions."""
+    native_bsdf, drawn = convert.replacement.native_bsdf, []
+    real = native_bsdf.draw_facets
+
+    def draw_facets(u, alpha, *more):
+        drawn.append(len(u))
+        return real(u, alpha, *more)
+
+    monkeypatch.setattr(native_bsdf, "draw_facets", draw_facets)
+    material, _ = material_of("principled", "MULTI_GGX", Base_Color=GOLD, Roughness=0.4321)
+    assert not only(convert.plan([material])).refusal
+    assert len(drawn) == 4
+
+
 @pytest.mark.parametrize("alpha", [0.2, 0.5, 1.0])
 def test_white_facets_lose_no_light(extension, convert, alpha):
     """Of multiscatter_ggx, whose albedo has no closed form."""
