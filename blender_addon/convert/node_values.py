@@ -30,12 +30,13 @@ KINDS = {
     "ShaderNodeBsdfPrincipled": "principled",
     "ShaderNodeBsdfGlass": "glass",
 }
-#: Nodes that stay beside models, as they do what models can't.
+#: Nodes that stay beside models, as they do what models can't. Cycles shows nothing of a volume's
+#: node in a surface, where importers put one.
 STAYING = {
     f"ShaderNode{name}"
     for name in (
         *("AddShader", "Background", "BsdfTransparent", "Emission", "Holdout", "MixShader"),
-        "Script",
+        *("Script", "VolumeAbsorption", "VolumeScatter", "VolumePrincipled", "VolumeCoefficients"),
     )
 }
 #: Sockets that must have the value at which they have no effect, as no model offers their effect.

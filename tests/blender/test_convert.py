@@ -1062,6 +1062,23 @@ def test_a_link_that_blender_ignores_is_no_link(extension, convert, empty, ignor
     assert extension.model_nodes.constants(base)["rho"] is not None
 
 
+@pytest.mark.parametrize("kind", ["VolumeAbsorption", "VolumeScatter", "VolumePrincipled"])
+def test_a_volume_in_a_surface_shows_nothing_and_is_no_reason(extension, convert, empty, kind):
+    """glTF's importer adds one to the surface of glass."""
+    material, node = material_of("principled", Base_Color=GOLD, Roughness=0.6)
+    before, tree = flat(empty, material), material.node_tree
+    volume, add = tree.nodes.new(f"ShaderNode{kind}"), tree.nodes.new("ShaderNodeAddShader")
+    output = node.outputs[0].links[0].to_socket
+    tree.links.new(node.outputs[0], add.inputs[0])
+    tree.links.new(volume.outputs[0], add.inputs[1])
+    tree.links.new(add.outputs[0], output)
+    np.testing.assert_allclose(flat(empty, material), before, rtol=1e-6)
+    plan = only(convert.plan([material]))
+    assert plan.node == node and convert.apply([plan]) == 1
+    assert volume.outputs[0].is_linked
+    np.testing.assert_allclose(flat(empty, material), before, rtol=0.02)
+
+
 def test_a_muted_node_is_not_converted(extension, convert, empty):
     material, node = material_of("principled", Base_Color=(0.8, 0.1, 0.1))
     node.mute = True
