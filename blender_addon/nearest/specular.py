@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A rough dielectric Principled node whose Specular IOR Level or Specular Tint varies: one glossy
-layer over one base, whose values follow that share as polynomials. Independent of
-bpy."""
+layer over one base, whose values follow its share of the highest value as polynomials. Independent
+of bpy."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

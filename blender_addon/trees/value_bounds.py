@@ -21,7 +21,6 @@ _FROM_0_TO_1 = {
     "TexBrick": {"Fac", "Factor"},
     "TexChecker": {"Fac", "Factor"},
     "TexGradient": None,
-    "TexMagic": None,
     "TexNoise": None,
     "TexVoronoi": {"Color"},
     "TexWave": None,
@@ -47,10 +46,8 @@ def bounds(socket, within=()):
 
 
 def _union(pairs):
-    lows, highs = zip(*pairs, strict=True)
-    return np.minimum.reduce(np.broadcast_arrays(*lows)), np.maximum.reduce(
-        np.broadcast_arrays(*highs)
-    )
+    lows, highs = (np.broadcast_arrays(*ends) for ends in zip(*pairs, strict=True))
+    return np.minimum.reduce(lows), np.maximum.reduce(highs)
 
 
 class _Bounds:
