@@ -370,9 +370,9 @@ def test_a_plan_computes_interreflection_once(extension, convert, empty, monkeyp
 
 
 def test_a_plan_samples_facets_once_for_each_set_of_views(extension, convert, empty, monkeypatch):
-    """Albedos of one surface share the samples: of its plan's views, of those of the layer's
-    polynomial, of the mean over all views, and of the light directions."""
-    native_bsdf, drawn = convert.replacement.native_bsdf, []
+    """Albedos of one surface share the samples: at its plan's views, at those of the layer's
+    polynomial, and of the mean over all views."""
+    native_bsdf, drawn = import_module(f"{extension.package}.nearest.native_bsdf"), []
     real = native_bsdf.draw_facets
 
     def draw_facets(u, alpha, *more):
@@ -380,9 +380,11 @@ def test_a_plan_samples_facets_once_for_each_set_of_views(extension, convert, em
         return real(u, alpha, *more)
 
     monkeypatch.setattr(native_bsdf, "draw_facets", draw_facets)
-    material, _ = material_of("principled", "MULTI_GGX", Base_Color=GOLD, Roughness=0.4321)
+    # A roughness that no other test has, as results are kept.
+    material, _ = material_of("principled", "MULTI_GGX", Base_Color=GOLD, Roughness=0.5678)
     assert not only(convert.plan([material])).refusal
-    assert len(drawn) == 4
+    of_albedos = [count for count in drawn if count > 1000]  # fewer are light directions
+    assert len(of_albedos) == 3
 
 
 @pytest.mark.parametrize("alpha", [0.2, 0.5, 1.0])
