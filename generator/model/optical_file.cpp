@@ -163,10 +163,14 @@ class Database {
     int number = 0;
     for (const std::string& full : lines) {
       ++number;
-      if (give_)
-        styled(open_ + "\n" + full, give_, since_);
-      else
+      if (give_) {
+        open_ += "\n" + full;
+        unclosed_ += unclosed(full);
+        // Reading a long table anew at each line would take long.
+        if (may_end(open_, full, unclosed_)) styled(std::string(open_), give_, since_);
+      } else {
         read(full, number);
+      }
     }
     if (give_) fail(since_, open_);
   }
@@ -235,7 +239,7 @@ class Database {
     } catch (const std::invalid_argument&) {
       fail(number, text);
     }
-    open_ = value ? "" : text, give_ = value ? nullptr : give, since_ = number;
+    open_ = value ? "" : text, unclosed_ = unclosed(open_), give_ = value ? nullptr : give, since_ = number;
     if (value) (this->*give)(*value, number);
   }
 
@@ -280,7 +284,7 @@ class Database {
   const std::string& file_;
   std::string section_, key_, open_;
   Give give_ = nullptr;
-  int since_ = 0;
+  int since_ = 0, unclosed_ = 0;
 };
 
 OpticalFile read_database(const std::vector<std::string>& lines, const std::string& file) {

@@ -119,6 +119,7 @@ class Reader {
   }
 
   template <class Add> void items(char end, const Add& add) {
+    if (++depth_ > kMostDeep) throw std::invalid_argument("too deep");
     ++at_;
     while (peek() != end) {
       add();
@@ -128,6 +129,7 @@ class Reader {
         throw std::invalid_argument("no comma");
     }
     ++at_;
+    --depth_;
   }
 
   YamlValue list() {
@@ -147,14 +149,28 @@ class Reader {
     return out;
   }
 
+  /// Files have lists of mappings of lists of rows.
+  static constexpr int kMostDeep = 8;
+
   const std::string& text_;
   std::size_t at_ = 0;
+  int depth_ = 0;
 };
 
 }  // namespace
 
 bool is_styled(const std::string& text) {
   return !text.empty() && std::string("\"'[{").find(text[0]) != std::string::npos;
+}
+
+int unclosed(const std::string& line) {
+  int out = 0;
+  for (const char c : line) out += (c == '[' || c == '{') - (c == ']' || c == '}');
+  return out;
+}
+
+bool may_end(const std::string& text, const std::string& line, int still_open) {
+  return text[0] == '"' || text[0] == '\'' ? line.find(text[0]) != std::string::npos : still_open <= 0;
 }
 
 std::optional<YamlValue> yaml_value(const std::string& text) {

@@ -22,6 +22,12 @@ struct YamlValue {
 /// True if a text begins with a quote, a bracket or a brace.
 bool is_styled(const std::string& text);
 
+/// The number of brackets and braces that a line opens and does not close.
+int unclosed(const std::string& line);
+
+/// Whether a value that begins with a text may end in a line. `still_open`: unclosed() of all its lines.
+bool may_end(const std::string& text, const std::string& line, int still_open);
+
 /// The value that a text is; none if it needs further lines. Throws std::invalid_argument.
 std::optional<YamlValue> yaml_value(const std::string& text);
 

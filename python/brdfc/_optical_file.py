@@ -140,14 +140,18 @@ class _Database:
     def __init__(self, lines, path):
         self.entries, self._references = [], []
         self._path, self._section, self._key = path, "", ""
-        self._open, self._give, self._since = "", None, 0
+        self._open, self._unclosed, self._give, self._since = [], 0, None, 0
         for number, full in enumerate(lines, 1):
             if self._give:
-                self._styled(self._open + "\n" + full, self._give, self._since)
+                self._open.append(full)
+                self._unclosed += yaml_styles.unclosed(full)
+                # Reading a long table anew at each line would take long.
+                if yaml_styles.may_end(self._open[0], full, self._unclosed):
+                    self._styled("\n".join(self._open), self._give, self._since)
             else:
                 self._read(full, number)
         if self._give:
-            self._fail(self._since, self._open)
+            self._fail(self._since, self._open[0])
 
     @property
     def source(self):
@@ -204,11 +208,12 @@ class _Database:
         try:
             value = yaml_styles.value(text)
         except yaml_styles.Open:
-            self._open, self._give, self._since = text, give, number
+            self._open, self._unclosed = [text], yaml_styles.unclosed(text)
+            self._give, self._since = give, number
             return
         except ValueError:
             self._fail(number, text)
-        self._open, self._give = "", None
+        self._give = None
         give(value, number)
 
     def _add_all(self, found, number):

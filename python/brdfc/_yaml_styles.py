@@ -14,9 +14,13 @@ class Open(Exception):
     """The value goes on in the next line."""
 
 
+#: Files have lists of mappings of lists of rows.
+_MOST_DEEP = 8
+
+
 class _Reader:
     def __init__(self, text):
-        self._text, self._at = text, 0
+        self._text, self._at, self._depth = text, 0, 0
 
     def _peek(self):
         while self._at < len(self._text) and self._text[self._at] in " \t\n":
@@ -65,6 +69,9 @@ class _Reader:
         return _folded(_without_escapes(raw) if quote == '"' else raw.replace("''", "'"))
 
     def _items(self, end, add):
+        self._depth += 1
+        if self._depth > _MOST_DEEP:
+            raise ValueError
         self._at += 1
         while self._peek() != end:
             add()
@@ -73,6 +80,7 @@ class _Reader:
             elif self._peek() != end:
                 raise ValueError
         self._at += 1
+        self._depth -= 1
 
     def _list(self):
         found = []
@@ -123,6 +131,17 @@ def _folded(text):
 
 def is_styled(text):
     return text[:1] in tuple("\"'[{")
+
+
+def unclosed(line):
+    """The number of brackets and braces that a line opens and does not close."""
+    return sum(map(line.count, "[{")) - sum(map(line.count, "]}"))
+
+
+def may_end(text, line, still_open):
+    """Whether a value that begins with a text may end in a line. `still_open`: unclosed() of all
+    its lines."""
+    return text[0] in line if text[0] in "\"'" else still_open <= 0
 
 
 def value(text):

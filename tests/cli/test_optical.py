@@ -7,6 +7,7 @@ import json
 import re
 import subprocess
 import sys
+import time
 
 import numpy as np
 import PyOpenColorIO as ocio
@@ -172,6 +173,26 @@ def test_a_table_is_read_however_it_is_written(tmp_path, optics, way):
     assert told["label"] == package.label == label
     if way == "YAML":
         assert package.source == told["source"] == "A. Nyone. Own data (2020)"
+
+
+@pytest.mark.parametrize("style", ["quotes", "brackets", "open"])
+def test_long_tables_of_yaml_are_read_in_linear_time(tmp_path, optics, style):
+    rows = [f"{0.3 + i / 20000:.5f} 1.5" for i in range(12000)]
+    if style == "quotes":
+        data = "'" + "\n\n    ".join(rows) + "'"
+    else:
+        data = "[" + ",\n    ".join(f"[{row.replace(' ', ', ')}]" for row in rows)
+        data += "]" if style == "brackets" else ""
+    file = tmp_path / "own.yml"
+    file.write_text(f"DATA:\n  - type: tabulated n\n    data: {data}\n")
+    before = time.process_time()
+    if style == "open":
+        with pytest.raises(ValueError, match="line 3: expected a string, a list"):
+            optics.read(file)
+        assert run("optical", file).returncode == 2
+    else:
+        assert len(optics.read(file).n.nm) == 12000 and optical(file)["n_d"] == 1.5
+    assert time.process_time() - before < 5
 
 
 #: Published coefficients, and n at the line d (587.56 nm) from the same publications: fused silica
@@ -445,6 +466,8 @@ BAD = {
     "got '{type tabulated n}'",
     "DATA:\n  - type: tabulated n\n    data: {a: 1}\n": " line 3: expected numbers, got 'data'",
     "DATA: [1, 2]\n": " line 1: expected '- type: ...', got '1'",
+    f"DATA: {'[' * 100_000}\n": f" line 1: expected a string, a list or a mapping of YAML, got "
+    f"'{'[' * 100_000}'",
 }
 
 
