@@ -325,7 +325,8 @@ def set_substance(material, substance, node=None, thickness=None):
     The material must have one model, or `node` is or names one of its model nodes. The values are
     in the working space of the file: n and k by channel, or the colour reflected at normal
     incidence, whichever parameters the model has, and the absorption inside, which is exact at
-    `thickness` metres (0.01 by default). All other parameters keep their values.
+    `thickness` metres (0.01 by default). Where no k is given, nothing is absorbed. All other
+    parameters keep their values.
 
     `substance`: one of substances(), or a file NAME.csv or NAME.txt as refractiveindex.info exports
     it, or NAME.yml of its database. Returns the parameters that were set, and prints the

@@ -5,20 +5,21 @@ converted."""
 import functools
 
 import bpy
+import numpy as np
 
 from ..common.i18n import Sentence, say
 from ..nearest import native_bsdf, specular
 from ..nearest.native_bsdf import Native
-from ..trees import animation, shader_trees, shader_values
+from ..trees import animation, shader_trees, shader_values, value_bounds
 
 #: The roughnesses and anisotropies at which a model is fitted when a texture provides them; and in
 #: which pairs, if it provides both.
 ROUGHNESSES = (0.2, 0.5, 0.8)
 _ANISOTROPIES = (0.5, 0.8, 0.2)
-#: Colour at which the width is fitted if the linked colour is unknown.
-GREY = (0.5, 0.5, 0.5)
-#: Such a colour may lie anywhere between these: a plan's error is then a range.
+#: A linked colour that is unknown may lie anywhere between these: a plan's error is then a range.
 DARK, BRIGHT = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+#: Models are not compared with linked roughnesses below this: Cycles shows a mirror there.
+_LEAST_ROUGHNESS = 0.05
 #: If the instances of a node have more colours, the error is computed for the darkest and the
 #: brightest.
 _MOST_COLORS = 4
@@ -29,12 +30,13 @@ KINDS = {
     "ShaderNodeBsdfPrincipled": "principled",
     "ShaderNodeBsdfGlass": "glass",
 }
-#: Nodes that stay beside models, as they do what models can't.
+#: Nodes that stay beside models, as they do what models can't. Cycles shows nothing of a volume's
+#: node in a surface, where importers put one.
 STAYING = {
     f"ShaderNode{name}"
     for name in (
         *("AddShader", "Background", "BsdfTransparent", "Emission", "Holdout", "MixShader"),
-        "Script",
+        *("Script", "VolumeAbsorption", "VolumeScatter", "VolumePrincipled", "VolumeCoefficients"),
     )
 }
 #: Sockets that must have the value at which they have no effect, as no model offers their effect.
@@ -153,13 +155,30 @@ class Inputs:
             self._found[name] = told.pop() if len(told) == 1 else None
         return self._found[name]
 
-    def means(self, name):
-        """The distinct values, or their means over images; None if one of them is unknown."""
+    def means(self, name, part="mean"):
+        """The distinct values, or means of images; None if one of them is unknown. `part`: as for
+        shader_values.mean()."""
         if (known := self.constant(name)) is not None:
             return [known]
         socket = self._node.inputs[name]
-        found = dict.fromkeys(shader_values.mean(socket, within) for within in self._withins)
+        found = dict.fromkeys(shader_values.mean(socket, within, part) for within in self._withins)
         return None if None in found else list(found)
+
+    def bounds(self, name):
+        """The smallest and the largest value of a socket, (low, high), of each channel of a
+        colour. What is unknown counts as between 0 and 1."""
+        socket = self._node.inputs[name]
+        found = [None] if self.moves(name) else []
+        found += [value_bounds.bounds(socket, within) for within in self._withins]
+        if None in found:
+            return (DARK, BRIGHT) if socket.type == "RGBA" else (0.0, 1.0)
+        low, high = np.min([pair[0] for pair in found], 0), np.max([pair[1] for pair in found], 0)
+        return (tuple(low), tuple(high)) if np.ndim(low) else (float(low), float(high))
+
+    def ends(self, name):
+        """The same as two numbers, of a colour those of its channels."""
+        low, high = self.bounds(name)
+        return float(np.min(low)), float(np.max(high))
 
     def mean(self, name):
         """The mean of these; None if one of them is unknown."""
@@ -187,11 +206,15 @@ class Inputs:
         return self.constant(name)
 
     def colors(self, name):
-        """The colour for which a model is fitted, and the colours for which its error is
-        computed."""
+        """The colour for which a model is fitted, and the colours for which its error is computed:
+        of images the mean, and those of the darkest and of the brightest tenth of the pixels; of
+        others the darkest and the brightest."""
         if self.follows(name) and self.means(name) is None:
-            return GREY, (DARK, BRIGHT)
-        known = [tuple(max(c, 0.0) for c in color) for color in self.means(name)]
+            ends = tuple(tuple(max(float(c), 0.0) for c in end) for end in self.bounds(name))
+            return tuple(sum(c) / 2 for c in zip(*ends, strict=True)), ends
+        parts = ("dark", "mean", "bright") if self.follows(name) else ("mean",)
+        found = dict.fromkeys(color for part in parts for color in self.means(name, part))
+        known = [tuple(max(c, 0.0) for c in color) for color in found]
         if len(known) > _MOST_COLORS:
             known.sort(key=sum)
             known = [known[0], known[-1]]
@@ -232,7 +255,8 @@ def check_off(inputs, but=()):
 
 
 def given_of(node, inputs):
-    """What all Natives of a node have in common, and what they differ in."""
+    """What all Natives of a node have in common, what they differ in, and what others differ in of
+    which the error is computed too: at the ends of inputs that vary."""
     kind = KINDS[node.bl_idname]
     inputs.setting("mute")
     inputs.check_unknown(KNOWN_SOCKETS[kind])
@@ -251,8 +275,11 @@ def given_of(node, inputs):
         if is_plastic(inputs):
             given["f0"] = _f0_of(inputs)
             bases = _roughnesses(inputs, "Diffuse Roughness")
-        varies = varying_of(inputs) == specular.TINT
-        tint = (1.0,) * 3 if varies else inputs.value("Specular Tint", (1.0, 1.0, 1.0))
+        varying = varying_of(inputs)
+        if varying and varying.socket == specular.TINT.socket:
+            tint = (varying.top,) * 3
+        else:
+            tint = inputs.value("Specular Tint", (1.0, 1.0, 1.0))
         given["tint"] = tuple(max(c, 0.0) for c in tint)
     roughnesses = _roughnesses(inputs, "Roughness")
     stretches = (1.0,)
@@ -260,13 +287,34 @@ def given_of(node, inputs):
         stretches = _stretches(inputs, kind)
     count = max(len(roughnesses), len(stretches), len(bases))
     looks = {"roughness": roughnesses, "stretch": stretches, "diffuse_roughness": bases}
+    ends = {
+        "roughness": _ends_of(inputs, "Roughness", roughnesses),
+        "diffuse_roughness": _ends_of(inputs, "Diffuse Roughness", bases),
+    }
+    if len(stretches) > 1:
+        found = inputs.ends(ANISOTROPY[kind][0])
+        ends["stretch"] = tuple(map(_stretch_of, found))
+    ends = {name: values for name, values in ends.items() if values}
+    return given, _in_turn(looks, count), _in_turn(looks | ends, 2) if ends else []
+
+
+def _in_turn(looks, count):
+    """`count` dicts of values from {name: values}, which are repeated."""
     looks = {name: (values * count)[:count] for name, values in looks.items()}
-    return given, [{name: looks[name][i] for name in looks} for i in range(count)]
+    return [{name: looks[name][i] for name in looks} for i in range(count)]
 
 
 def _roughnesses(inputs, name):
     """The roughness of a socket, or several."""
     return ROUGHNESSES if inputs.follows(name) else (min(max(inputs.value(name), 0.0), 1.0),)
+
+
+def _ends_of(inputs, name, roughnesses):
+    """The lowest and the highest roughness of a socket that varies; none if it is one."""
+    if len(roughnesses) == 1:
+        return ()
+    least = _LEAST_ROUGHNESS if name == "Roughness" else 0.0
+    return tuple(min(max(end, least), 1.0) for end in inputs.ends(name))
 
 
 def is_plastic(inputs):
@@ -284,7 +332,7 @@ def varying_of(inputs):
     found = [v for v in both if v.socket in inputs and inputs.follows(v.socket)]
     if len(found) > 1:
         raise both_linked(*(v.socket for v in found))
-    return found[0] if found else None
+    return found[0].between(*inputs.ends(found[0].socket)) if found else None
 
 
 def both_linked(socket, other):
@@ -299,9 +347,11 @@ def both_linked(socket, other):
 
 
 def _f0_of(inputs):
-    """Reflectance of the interface of a Principled node at normal incidence, at level 1 if the
-    level varies."""
-    level = 1.0 if varying_of(inputs) == specular.LEVEL else inputs.value("Specular IOR Level")
+    """Reflectance of the interface of a Principled node at normal incidence, at the highest level
+    if the level varies."""
+    varying = varying_of(inputs)
+    varies = varying and varying.socket == specular.LEVEL.socket
+    level = varying.top if varies else inputs.value("Specular IOR Level")
     ior = inputs.value("IOR")
     if ior < 1:
         # As seen from within glass: beyond some angle everything is reflected.
@@ -321,7 +371,7 @@ def color_of(kind):
 def natives(node):
     """The node as Natives: one, or several if roughness or anisotropy are linked. Raises
     Refused."""
-    given, looks = given_of(node, Inputs(node))
+    given, looks, _ = given_of(node, Inputs(node))
     return [Native(**given, **look) for look in looks]
 
 
@@ -335,6 +385,11 @@ ANISOTROPY = {
 RATIO = -0.9
 #: Cycles clamps the Anisotropy of a Glossy node to this, and to its negative.
 _MOST_GLOSSY = 0.99
+
+
+def _stretch_of(anisotropic):
+    """Ratio of the lobe's width along the tangent to that across it, of a Principled node."""
+    return 1 / (1 + RATIO * min(max(anisotropic, 0.0), 1.0))
 
 
 def _stretches(inputs, kind):
@@ -355,7 +410,7 @@ def _stretches(inputs, kind):
             )
             raise Refused(said)
     if kind == "principled":
-        return tuple(1 / (1 + RATIO * min(max(a, 0.0), 1.0)) for a in found)
+        return tuple(_stretch_of(a) for a in found)
     found = tuple(min(max(a, -_MOST_GLOSSY), _MOST_GLOSSY) for a in found)
     return tuple((1 - a) ** 2 if a > 0 else 1 / (1 + a) ** 2 for a in found)
 

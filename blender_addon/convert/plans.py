@@ -2,6 +2,7 @@
 """Chooses the model that replaces a node, with its values and links, and estimates the error."""
 
 import functools
+import itertools
 import math
 from dataclasses import replace
 
@@ -29,7 +30,6 @@ from .filter_glossy import is_filtered
 from .instances import Instances
 from .node_values import (
     ANISOTROPY,
-    GREY,
     KINDS,
     KNOWN_SOCKETS,
     STAYING,
@@ -47,6 +47,8 @@ from .node_values import (
 from .planned_node import Part, Plan
 from .seen_node import SeenNode
 
+#: Errors of nodes that reflect less, such as a black Glossy node, say nothing.
+_NO_LIGHT = 1e-4
 #: The model of smooth glass.
 _CLEAR = "fresnel_dielectric"
 
@@ -216,6 +218,17 @@ def _part(inputs, native, fit, color):
     )
 
 
+def _errors(found):
+    """Of (light, error) of each colour and roughness the errors, except where there is next to no
+    light."""
+    return [error for light, error in found if light > _NO_LIGHT] or [0.0]
+
+
+def _found(fit):
+    """(light, error) of all colours and roughnesses of a fit."""
+    return list(itertools.chain(*fit.found))
+
+
 def _lacking(natives, colors):
     """Why no model is near: a sentence."""
     if fit := nearest(natives, colors, False, _shown(False)):
@@ -223,7 +236,7 @@ def _lacking(natives, colors):
             "its nearest model, {model}, which sends {percent} % of the light in other directions "
             "than the node, needs Open Shading Language for its values",
             model=pack.model(fit.candidate.model).label,
-            percent=in_percent(max(error for _, error in fit.found)),
+            percent=in_percent(max(_errors(_found(fit)))),
         )
     models = dict.fromkeys(c.model for c in candidates(natives[0]))
     return say("this extension lacks the models that are near: {models}", models=", ".join(models))
@@ -232,7 +245,7 @@ def _lacking(natives, colors):
 #: Values to which those of a node are changed, one after the other, to find what makes an error
 #: large: as in a new node, but for the colour; and the socket with this value.
 _PLAIN = {
-    "color": (GREY, ""),
+    "color": ((0.5, 0.5, 0.5), ""),
     "tint": ((1.0, 1.0, 1.0), "Specular Tint"),
     "diffuse_roughness": (0.0, "Diffuse Roughness"),
     "stretch": (1.0, "Anisotropic"),
@@ -259,16 +272,18 @@ def _plan_node(material, node, inputs):
         return _plan_glass(material, node, inputs)
     if KINDS[node.bl_idname] == "principled" and _is_clear(inputs):
         return _plan_clear(material, node, inputs)
-    given, looks = given_of(node, inputs)
+    given, looks, ends = given_of(node, inputs)
     color = color_of(given["kind"])
     _, colors = inputs.colors(color)
 
     has = _shown(device.lacks_osl(lamps.current_scene()))
     varying = varying_of(inputs) if given["kind"] == "principled" else None
 
-    def looked(**other):
+    def looked(looks=looks, **other):
         """The Natives of the node with these values changed."""
         found = tuple(Native(**given | look | other) for look in looks)
+        if not found:
+            return ()
         # Without a highlight, roughness and anisotropy of a Principled node have no effect.
         if found[0].is_matte and found[0].kind == "principled":
             return mattes_of(found)
@@ -281,9 +296,10 @@ def _plan_node(material, node, inputs):
         natives = looked(**other)
         if varying and natives[0].kind == "principled" and natives[0].metallic == 0:
             return _varying_part(inputs, varying, natives, colors, has, color)
-        if varying == specular.TINT and natives[0].metallic > 0:
+        if varying and varying.socket == specular.TINT.socket and natives[0].metallic > 0:
             inputs.value(varying.socket)  # says that it is linked
-        fit = nearest(natives, colors, inputs.reaches(color), has)
+        also = tuple(n for n in looked(ends, **other) if n not in natives)
+        fit = nearest(natives, colors, inputs.reaches(color), has, also)
         if fit is None:
             raise Refused(_lacking(natives, colors))
         part = _part(inputs, natives[0], fit, color)
@@ -296,7 +312,7 @@ def _plan_node(material, node, inputs):
         """The error of one model for the node with these values changed."""
         shades = (other["color"],) if "color" in other else colors
         fit = nearest(looked(**other), shades, False, has)
-        return math.inf if fit is None else max(error for _, error in fit.found)
+        return math.inf if fit is None else max(_errors(_found(fit)))
 
     def plan(part, fits, errors, **more):
         if inputs.follows(color) and any(fit.lost for fit in fits):
@@ -315,30 +331,33 @@ def _plan_node(material, node, inputs):
 
     if given["kind"] != "principled":
         part, fit = near()
-        return plan(part, [fit], [error for _, error in fit.found])
+        return plan(part, [fit], _errors(_found(fit)))
     more = {"glows": glows(inputs), "transparent": is_transparent(inputs)}
     single = None
     if not inputs.follows("Metallic"):
         part, fit = near()
         is_pure = given["metallic"] in (0, 1)
         if is_pure or not varying and not (fit.lost and inputs.follows(color)):
-            single = plan(part, [fit], [error for _, error in fit.found], **more)
+            single = plan(part, [fit], _errors(_found(fit)), **more)
         if is_pure:
             return single
     (part, plain), (metal, fit) = near(metallic=0.0), near(metallic=1.0)
     if (share := inputs.mean("Metallic")) is None:
-        errors = [error for _, error in (*plain.found, *fit.found)]
+        errors = _errors(_found(plain) + _found(fit))
     else:
         share = min(max(share, 0.0), 1.0)
-        errors = [_mixed(share, *both) for both in zip(plain.found, fit.found, strict=True)]
+        of_colors = zip(plain.found, fit.found, strict=True)
+        pairs = (pair for both in of_colors for pair in itertools.product(*both))
+        errors = _errors([_mixed(share, *pair) for pair in pairs])
     mixed = plan(part, [plain, fit], errors, metal=metal, **more)
     return mixed if single is None or mixed.error < single.error else single
 
 
 def _mixed(share, plain, metal):
-    """The error of a mixture of two parts, given (light, error) of each."""
+    """(light, error) of a mixture of two parts, given those of each."""
     lights = (1 - share) * plain[0], share * metal[0]
-    return (lights[0] * plain[1] + lights[1] * metal[1]) / max(sum(lights), 1e-9)
+    off = lights[0] * plain[1] + lights[1] * metal[1]
+    return sum(lights), off / max(sum(lights), 1e-9)
 
 
 def plan(materials):

@@ -245,10 +245,11 @@ class Replacement:
         return self._clamped("Roughness")
 
     def _share(self):
-        """The largest channel of the input of Plan.varying, between 0 and 1."""
-        return self._clamped(self._plan.varying.socket)
+        """The largest channel of the input of Plan.varying, as a share between 0 and 1."""
+        top = self._plan.varying.top
+        return self._clamped(self._plan.varying.socket, 1 / top)
 
-    def _clamped(self, name):
+    def _clamped(self, name, factor=1.0):
         if name not in self._clamps:
             source = self._source(name)
             if self._node.inputs[name].type == "RGBA":
@@ -257,6 +258,8 @@ class Replacement:
                 red, green, blue = channels.outputs
                 source = self._operation("ShaderNodeMath", "MAXIMUM", red, green)
                 source = self._operation("ShaderNodeMath", "MAXIMUM", source, blue)
+            if factor != 1:
+                source = self._operation("ShaderNodeMath", "MULTIPLY", source, factor)
             clamped = self._helper("ShaderNodeClamp")
             self._tree.links.new(source, clamped.inputs["Value"])
             self._clamps[name] = clamped.outputs[0]
@@ -265,6 +268,8 @@ class Replacement:
     def _followed(self, law, varying):
         """Nodes for a row of Part.laws."""
         of = self._source(varying.socket)
+        if varying.top != 1:
+            of = self._operation("ShaderNodeVectorMath", "MULTIPLY", of, 1 / varying.top)
         of = self._operation("ShaderNodeVectorMath", "MAXIMUM", of, varying.dimmed)
         of = self._operation("ShaderNodeVectorMath", "MINIMUM", of, 1.0)
         found = law[-1]

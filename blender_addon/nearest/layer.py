@@ -27,7 +27,7 @@ def rest(f0, tint, multiscatter, roughness=None):
     roughnesses = _ROUGHNESSES if roughness is None else np.array([roughness])
     views = np.stack([np.sqrt(1 - _COSINES**2), 0 * _COSINES, _COSINES], -1)
     plastic = native_bsdf.Native("principled", (1.0, 1.0, 1.0), f0=f0, multiscatter=multiscatter)
-    plastic = replace(plastic, tint=(tint,) * 3)
+    plastic = replace(plastic, tint=(tint,))  # the only channel that matters
     nodes = [replace(plastic, roughness=r) for r in roughnesses]
     left = 1 - np.stack([native_bsdf.view_terms(node, views).taken for node in nodes])
     degree = _DEGREE_ROUGHNESS if roughness is None else 0
@@ -52,7 +52,8 @@ def rest_of_share(native, at, least):
     (1 - cos)^i share^j. `least`: the lowest share but 0 to which it is fitted."""
     shares = np.concatenate([[0.0], np.linspace(least, 1, 12)])
     views = np.stack([np.sqrt(1 - _COSINES**2), 0 * _COSINES, _COSINES], -1)
-    nodes = [at(replace(native, color=(1.0, 1.0, 1.0)), share) for share in shares]
+    native = replace(native, color=(1.0, 1.0, 1.0), tint=(max(native.tint),))
+    nodes = [at(native, share) for share in shares]
     left = 1 - np.stack([native_bsdf.view_terms(node, views).taken for node in nodes])
     of_view = (1 - _COSINES)[:, None] ** np.arange(_DEGREE + 1)
     of_share = shares[:, None] ** np.arange(_DEGREE_SHARE + 1)
@@ -86,10 +87,11 @@ def schlick_like(f0, tint=1.0):
     c = np.linspace(0.2, 1, 33)
     wanted = native_bsdf.tinted_dielectric(native_bsdf.dielectric(f0, c), f0, (tint,))[:, 0]
     f0s = (f0 * tint * np.linspace(0.7, 1.3, 61))[:, None, None]
-    tints = np.linspace(0.7, 1, 31)[:, None]
+    tints = np.linspace(0, 1, 101)[:, None]
     tinted = native_bsdf.TINTED
     strongest = c * (1 - c) ** 6 / (tinted * (1 - tinted) ** 6)
     found = (f0s + (1 - f0s) * (1 - c) ** 5) * (1 - (1 - tints) * strongest)
-    off = np.abs(found / wanted - 1).mean(-1)
+    # A tint of 0 reflects nothing at normal incidence.
+    off = (np.abs(found - wanted) / (wanted + 1e-3)).mean(-1)
     i, j = np.unravel_index(np.argmin(off), off.shape)
     return float(f0s[i, 0, 0]), float(tints[j, 0])

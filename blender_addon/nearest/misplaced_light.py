@@ -116,6 +116,11 @@ class Target:
         self.mirror = native_bsdf.mirror(native, self.at.each)
         self.total = self.at.light(self.f_cos) + self.mirror
 
+    @property
+    def light(self):
+        """The reflected light, averaged over views and channels."""
+        return float(self.total.mean())
+
     def _f_cos(self, model, values, base, scale, which=slice(None)):
         """f cos of a model times `scale` over a Base, or None, at some of the directions."""
         from ..brdfc import model as formulas

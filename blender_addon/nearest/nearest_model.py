@@ -288,25 +288,32 @@ class Fit:
 
     candidate: Candidate
     factor: float
-    #: (light, error) for each of the requested node colours.
+    #: For each of the requested node colours, (light, error) of each of the nodes and of `also`.
     found: tuple
     #: Whether the conversion would lose a link to the node's colour.
     lost: bool
 
 
 @functools.lru_cache(maxsize=256)
-def nearest(natives, colors, colored, has):
+def nearest(natives, colors, colored, has, also=()):
     """The Fit to a tuple of nodes that differ only in roughnesses and stretch; None if no model
     comes near.
 
     Considers the models and values for which has(model, values) is true. The Fit includes the
-    errors for nodes of other colours, `colors`. `colored`: whether the node's colour is linked; a
-    model without a colour parameter would lose that link."""
+    errors for nodes of other colours, `colors`, and of other roughnesses, `also`. `colored`:
+    whether the node's colour is linked; a model without a colour parameter would lose that
+    link."""
     native, targets, found = natives[0], [Target(n) for n in natives], []
+    follows = len({n.roughness for n in natives}) > 1
 
     def fit(candidate, factor, error, lost):
-        known = {native.color: (_light(targets), error)}
-        errors = (known.get(c) or _light_and_error(candidate, targets, factor, c) for c in colors)
+        known = {native: (targets[0].light, error)} if len(natives) == 1 else {}
+
+        def found(here):
+            return known.get(here) or _light_and_error(candidate, here, factor, follows)
+
+        shades = [[replace(n, color=c) for n in (*natives, *also)] for c in colors]
+        errors = (tuple(found(here) for here in of_color) for of_color in shades)
         return Fit(candidate, factor, tuple(errors), lost)
 
     considered = candidates(native, has, natives)
@@ -344,33 +351,24 @@ def nearest(natives, colors, colored, has):
     return fit(candidate, factor, error, best[0])
 
 
-def _light(targets):
-    """The reflected light of nodes, averaged over them."""
-    return float(np.mean([t.total.mean() for t in targets]))
+def _light_and_error(candidate, native, factor, follows):
+    """The light of a node, and a candidate's error for a factor of its width."""
+    target = Target(native)
+    return target.light, _measured(Target.error, candidate, target, factor, follows)
 
 
-def _light_and_error(candidate, targets, factor, color):
-    """The light of the nodes in another colour, and a candidate's error for a factor of its width,
-    averaged over the nodes."""
-    targets = [Target(replace(t.native, color=color)) for t in targets]
-    return _light(targets), _mean(Target.error, candidate, targets, factor)
+def _measured(measure, candidate, target, factor, follows):
+    """One of Target's methods for a candidate. `follows`: whether the roughness is linked."""
+    native = target.native
+    values, base = with_width(candidate, native, factor), base_of(candidate, native, follows)
+    return measure(target, candidate.model, values, base, scale_of(candidate, native))
 
 
 def _mean(measure, candidate, targets, factor):
     """The mean of one of Target's methods over nodes; with several roughnesses the roughness is
     linked."""
     follows = len({t.native.roughness for t in targets}) > 1
-    found = [
-        measure(
-            t,
-            candidate.model,
-            with_width(candidate, t.native, factor),
-            base_of(candidate, t.native, follows),
-            scale_of(candidate, t.native),
-        )
-        for t in targets
-    ]
-    return sum(found) / len(found)
+    return sum(_measured(measure, candidate, t, factor, follows) for t in targets) / len(targets)
 
 
 def _rough_width(candidate, targets):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A rough dielectric Principled node whose Specular IOR Level or Specular Tint varies from 0 to 1:
-one glossy layer over one base, whose values follow that share as polynomials. Independent of
-bpy."""
+"""A rough dielectric Principled node whose Specular IOR Level or Specular Tint varies: one glossy
+layer over one base, whose values follow its share of the highest value as polynomials. Independent
+of bpy."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,10 +14,13 @@ from .nearest_model import Base, matte_of, nearest, with_width
 
 #: The model of the layer.
 MODEL = "microfacet"
+#: Limits of Varying.top and of Varying.dimmed, so that polynomials have a range.
+_LEAST_TOP, _MOST_DIMMED = 0.01, 0.8
 #: Degree in the share of the model's values.
 _DEGREE = 3
-#: Shares at which the error is measured.
-SHARES = (0.05, 0.25, 0.5, 0.75, 1.0)
+#: Shares at which the error is measured, as far as the input has them. A layer with less reflects
+#: hardly anything.
+_SHARES = (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,20 @@ class Varying:
     #: Below this share the layer is dimmed in proportion to it. The model's Fresnel term, which is
     #: 1 at the horizon, would be too bright there.
     dimmed: float
+    #: The input's lowest value, as a share, and the value at share 1, its highest.
+    low: float = 0.0
+    top: float = 1.0
+
+    def between(self, low, high):
+        """The same for an input with values from `low` to `high`."""
+        top = max(high, _LEAST_TOP)
+        low = min(max(low / top, 0.0), 1.0)
+        return replace(self, low=low, top=top, dimmed=min(self.dimmed / top, _MOST_DIMMED))
+
+    @property
+    def shares(self):
+        """Those of which the error is computed."""
+        return tuple(dict.fromkeys(max(share, self.low) for share in _SHARES))
 
 
 def _with_tint(native, share):
@@ -42,8 +59,8 @@ TINT = Varying("Specular Tint", _with_tint, 0.0)
 @dataclass(frozen=True)
 class VaryingFit:
     """`laws`: coefficients (r, g, b) of share^j of the parameters that follow it, from `dimmed` on.
-    `rest`: those of layer.rest_of_share(). `found`: (light, error) for each of the colours, of a
-    surface that has each of SHARES in equal parts."""
+    `rest`: those of layer.rest_of_share(). `found`: for each of the colours, (light, error) of each
+    of Varying.shares."""
 
     values: dict
     laws: dict
@@ -91,13 +108,11 @@ def fit(native, varying, candidate, colors, has):
         of_base = with_width(base.candidate, matte_of(here), base.factor)
         left = tuple((sum(c * share**j for j, c in enumerate(row)),) for row in rest)
         target, below = Target(here), Base(base.candidate.model, of_base, left)
+        if not target.total.any():
+            return 0.0, 0.0
         given = values | _at(laws, max(share, varying.dimmed))
         scale = min(share / varying.dimmed, 1.0) if varying.dimmed else 1.0
         return float(target.total.mean()), target.error(MODEL, given, below, scale)
 
-    found = []
-    for color in colors:
-        each = [error(color, share) for share in SHARES]
-        light = sum(light for light, _ in each)
-        found.append((light / len(each), sum(a * b for a, b in each) / max(light, 1e-9)))
-    return VaryingFit(values, laws, base, rest, tuple(found))
+    found = tuple(tuple(error(color, share) for share in varying.shares) for color in colors)
+    return VaryingFit(values, laws, base, rest, found)

@@ -161,4 +161,19 @@ def parameters(model_name, substance, thickness=None):
                 model=model_name,
             )
         raise ValueError(text)
-    return found
+    return found | _unsaid(model, found)
+
+
+def _unsaid(model, found):
+    """The values of the other parameters that describe a material, so that none remains of an
+    earlier substance: nothing is absorbed, and a dielectric has no tint."""
+    others = {
+        name: p
+        for name, p in model.parameters.items()
+        if "optical" in p and p["optical"] != "per_length" and name not in found
+    }
+    absorbs_nothing = (1.0, 1.0, 1.0)
+    return {
+        name: absorbs_nothing if p["optical"] == "attenuation" else p["default"]
+        for name, p in others.items()
+    }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Minimum, maximum and mean of the images in textures."""
+"""Minimum, maximum and means of the images in textures."""
 
 import os
 from dataclasses import dataclass
@@ -20,6 +20,9 @@ class Range:
     low: np.ndarray
     high: np.ndarray
     mean: np.ndarray
+    #: The means of the darkest and of the brightest tenth of the pixels.
+    dark: np.ndarray
+    bright: np.ndarray
 
 
 #: Cached by image: reading a large one takes half a second.
@@ -78,4 +81,8 @@ def _range(image, pixels, is_float):
     rows = np.concatenate([rgb, alpha], 1)
     if not np.isfinite(rows).all():
         return None
-    return Range(rows[0], rows[1], rows[2:].mean(0))
+    sampled = rows[2:]
+    by_light = sampled[np.argsort(color.luminance(sampled[:, :3]), kind="stable")]
+    tenth = max(len(by_light) // 10, 1)
+    dark, bright = by_light[:tenth].mean(0), by_light[-tenth:].mean(0)
+    return Range(rows[0], rows[1], sampled.mean(0), dark, bright)

@@ -29,16 +29,16 @@ def current(socket, within=()):
     return Current().told(socket, within)
 
 
-def mean(socket, within=()):
-    """The same, with images replaced by their mean."""
-    return _Mean(images=True).told(socket, within)
+def mean(socket, within=(), part="mean"):
+    """The same, with images replaced by a mean of theirs: a field of image_range.Range."""
+    return _Mean(part).told(socket, within)
 
 
 def _plain(value):
     return tuple(float(v) for v in value) if np.ndim(value) else float(value)
 
 
-def _as_type(value, socket):
+def as_type(value, socket):
     """Converts a linked value to the type of the socket."""
     wide = socket.type in _WIDTH
     if wide and not np.ndim(value):
@@ -105,10 +105,11 @@ class Constants:
         """The value of an input: an array (3,) or a number. Raises Unknown."""
         reached = shader_trees.reach(socket, within)
         if reached.output is not None:
-            return _as_type(self._output(reached), socket)
+            found = self.output(reached, lambda socket: self.of(socket, reached.within))
+            return as_type(found, socket)
         if reached.holder is None:
             return np.zeros(3) if socket.type in _WIDTH else 0.0
-        return _as_type(self._own(reached.holder), socket)
+        return as_type(self._own(reached.holder), socket)
 
     def _own(self, socket):
         if self._is_animated(socket.node, animation.value_key(socket)):
@@ -123,17 +124,19 @@ class Constants:
     def _is_animated(self, node, what):
         return what in self._animated_properties(node)
 
-    def _output(self, reached):
+    def output(self, reached, of):
+        """The value of the output of a node that is `reached`, given those of the node's inputs:
+        of(socket). Raises Unknown."""
         node, output = reached.node, reached.output
         kind = node.bl_idname.removeprefix("ShaderNode")
         compute = getattr(self, f"_{kind.lower()}", None)
         if compute is None:
             raise Unknown
-        if self._has_animated_settings(node):
+        if self.has_animated_settings(node):
             raise Unknown
-        return compute(node, output, lambda socket: self.of(socket, reached.within))
+        return compute(node, output, of)
 
-    def _has_animated_settings(self, node):
+    def has_animated_settings(self, node):
         return any(pointer == node.as_pointer() for pointer, _ in self._animated_properties(node))
 
     def _rgb(self, node, output, of):
@@ -243,12 +246,16 @@ class Current(Constants):
     def _is_animated(self, node, what):
         return False
 
-    def _has_animated_settings(self, node):
+    def has_animated_settings(self, node):
         return False
 
 
 class _Mean(Constants):
     """Assumes that nodes treat a mean as they treat each pixel."""
 
+    def __init__(self, part):
+        super().__init__(images=True)
+        self._part = part
+
     def _of_image(self, node, found, channels):
-        return found.mean[channels]
+        return getattr(found, self._part)[channels]

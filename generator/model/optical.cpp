@@ -255,4 +255,11 @@ ParamValues parameters_of(const ModelInfo& info, const Substance& s, const ToRgb
   return out;
 }
 
+ParamValues clear_inside(const ModelInfo& info) {
+  ParamValues out;
+  for (const ParamInfo& p : info.params)
+    if (p.optical == Optical::Attenuation) out[p.name] = std::array<double, 3>{1, 1, 1};
+  return out;
+}
+
 }  // namespace brdfc::inline model

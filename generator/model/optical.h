@@ -126,6 +126,9 @@ double power_law_error(const Substance&, double thickness, double distance, cons
 /// but the model or the substance does not absorb.
 ParamValues parameters_of(const ModelInfo&, const Substance&, const ToRgb&, std::optional<double> thickness = {});
 
+/// The values of those parameters for a substance that absorbs nothing of which parameters_of() says nothing.
+ParamValues clear_inside(const ModelInfo&);
+
 /// Beer's law: the share that remains after this many metres, at the wavelength in nm.
 template <class T> T transmittance(const T& nm, const T& k, const T& metres) {
   return exp(-(T(4 * kPi) * k / (nm * T(1e-9))) * metres);

@@ -5,13 +5,16 @@
 #include <cctype>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <sstream>
+#include <stdexcept>
 
 #include "core/csv.h"
 #include "core/error.h"
 #include "core/parse.h"
 #include "core/text_file.h"
 #include "model/optical.h"
+#include "model/yaml_styles.h"
 
 namespace brdfc::inline model {
 namespace {
@@ -109,11 +112,6 @@ std::vector<std::string> words_of(const std::string& text) {
   return out;
 }
 
-/// True for a line "KEY:" or "KEY: value" without indent.
-bool is_section(const std::string& line) {
-  return !line.empty() && std::isalpha(static_cast<unsigned char>(line[0])) && line.find(':') != std::string::npos;
-}
-
 /// A text without the tags of HTML.
 std::string without_tags(const std::string& text) {
   std::string out;
@@ -148,6 +146,9 @@ void add_formula(OpticalFile& out, int formula, const Entry& entry, const std::s
     input_error("{}: expected coefficients of formula {}, a number and pairs of numbers", where, formula);
   if (range.size() != 2 || ends.size() != 2 || !(range[0] < range[1]))
     input_error("{}: expected a wavelength_range of two numbers in \xc2\xb5m", where);
+  if (1000 * range[0] > kNeededMin || 1000 * range[1] < kNeededMax)
+    input_error("{}: expected a formula for {:g} to {:g} \xc2\xb5m, got one for {:g} to {:g} \xc2\xb5m", where,
+                kNeededMin / 1000, kNeededMax / 1000, range[0], range[1]);
   const double low = std::max(1000 * range[0], kSeenMin), high = std::min(1000 * range[1], kSeenMax);
   std::vector<double> nm;
   for (double x = low; x < high; x += kStep) nm.push_back(x);
@@ -155,42 +156,142 @@ void add_formula(OpticalFile& out, int formula, const Entry& entry, const std::s
   for (const double x : nm) out.n.push_back({x / 1000, of_formula(formula, c, x / 1000), entry.line});
 }
 
-OpticalFile read_database(const std::vector<std::string>& lines, const std::string& file) {
-  OpticalFile out;
+/// The list under DATA, and the text under REFERENCES.
+class Database {
+ public:
+  Database(const std::vector<std::string>& lines, const std::string& file) : file_(file) {
+    int number = 0;
+    for (const std::string& full : lines) {
+      ++number;
+      if (give_) {
+        open_ += "\n" + full;
+        unclosed_ += unclosed(full);
+        // Reading a long table anew at each line would take long.
+        if (may_end(open_, full, unclosed_)) styled(std::string(open_), give_, since_);
+      } else {
+        read(full, number);
+      }
+    }
+    if (give_) fail(since_, open_);
+  }
+
   std::vector<Entry> entries;
-  std::string section, key;
-  int number = 0;
-  for (const std::string& full : lines) {
-    ++number;
+  std::string source;
+
+ private:
+  using Give = void (Database::*)(const YamlValue&, int);
+
+  [[noreturn]] void fail(int line, const std::string& text,
+                         const std::string& expected = "a string, a list or a mapping of YAML") const {
+    input_error("{} line {}: expected {}, got '{}'", file_, line, expected, trim(text.substr(0, text.find('\n'))));
+  }
+
+  static bool is_block(const std::string& text) { return text == "|" || text == "|-" || text == ">"; }
+
+  static YamlValue text_of(const std::string& text) {
+    YamlValue out;
+    out.text = text;
+    return out;
+  }
+
+  void read(const std::string& full, int number) {
     std::string line = trim(full);
-    if (line.empty() || line[0] == '#') continue;
-    if (is_section(full)) {
-      section = full.substr(0, full.find(':'));
-      line = trim(line.substr(section.size() + 1));
-      if (line == "|" || line == "|-" || line == ">") line.clear();
-      key.clear();
+    if (line.empty() || line[0] == '#') return;
+    const auto [key, rest] = key_and_rest(full);
+    if (!key.empty()) {
+      section_ = key, key_.clear(), line = trim(rest);
+      if (key == "REFERENCES" && is_styled(line)) return styled(line, &Database::refer, number);
+      if (is_block(line) || line.starts_with("#")) line.clear();
     }
-    if (section == "REFERENCES" && !line.empty()) {
-      if (!out.source.empty()) out.source += ' ';
-      out.source += without_tags(line);
-    }
-    if (section != "DATA" || line.empty()) continue;
+    if (section_ == "REFERENCES" && !line.empty())
+      refer(text_of(line), number);
+    else if (section_ == "DATA" && !line.empty())
+      entry(line, number);
+  }
+
+  void refer(const YamlValue& found, int) {
+    if (!source.empty()) source += ' ';
+    source += trim(without_tags(found.text));
+  }
+
+  /// A line under DATA.
+  void entry(std::string line, int number) {
+    if (line[0] == '[') return styled(line, &Database::add_all, number);
     if (line.starts_with("- ")) {
       entries.push_back({"", number, {}});
       line = trim(line.substr(2));
     }
-    if (entries.empty()) input_error("{} line {}: expected '- type: ...', got '{}'", file, number, line);
-    Entry& entry = entries.back();
-    if (const auto colon = line.find(':'); colon != std::string::npos) {
-      key = line.substr(0, colon);
-      line = trim(line.substr(colon + 1));
-      std::erase(line, '"');
-      if (key == "type") entry.type = line, entry.line = number;
-      if (line == "|" || line == "|-" || line == ">") continue;
+    if (entries.empty()) fail(number, line, "'- type: ...'");
+    if (line.starts_with("{")) return styled(line, &Database::add_keys, number);
+    if (const auto [key, rest] = key_and_rest(line); !key.empty()) {
+      key_ = key, line = trim(rest);
+      if (is_styled(line)) return styled(line, &Database::add, number);
+      if (is_block(line)) return;
     }
-    entry.found[key].push_back({words_of(line), line, number});
+    add(text_of(line), number);
   }
-  for (const Entry& entry : entries) {
+
+  /// Gives the value that a text is to a function, perhaps after further lines.
+  void styled(const std::string& text, Give give, int number) {
+    std::optional<YamlValue> value;
+    try {
+      value = yaml_value(text);
+    } catch (const std::invalid_argument&) {
+      fail(number, text);
+    }
+    open_ = value ? "" : text, unclosed_ = unclosed(open_), give_ = value ? nullptr : give, since_ = number;
+    if (value) (this->*give)(*value, number);
+  }
+
+  void add_all(const YamlValue& found, int number) {
+    for (const YamlValue& keys : found.list) {
+      entries.push_back({"", number, {}});
+      add_keys(keys, number);
+    }
+  }
+
+  void add_keys(const YamlValue& keys, int number) {
+    if (keys.kind != YamlValue::Kind::Mapping) fail(number, keys.text, "'- type: ...'");
+    for (const auto& [key, value] : keys.mapping) {
+      key_ = key;
+      add(value, number);
+    }
+  }
+
+  static std::string joined(const YamlValue& row) {
+    std::string out = row.text;
+    for (const YamlValue& field : row.list) out += (out.empty() ? "" : " ") + field.text;
+    return out;
+  }
+
+  /// Adds lines to the value of the present key.
+  void add(const YamlValue& value, int number) {
+    if (value.kind == YamlValue::Kind::Mapping) fail(number, key_, "numbers");
+    std::string text = joined(value);
+    if (!value.list.empty() && value.list[0].kind == YamlValue::Kind::List) {
+      text.clear();
+      for (const YamlValue& row : value.list) text += joined(row) + "\n";
+    }
+    if (key_ == "type") {
+      entries.back().type = trim(text), entries.back().line = number;
+      return;
+    }
+    std::istringstream in(text);
+    for (std::string line; std::getline(in, line);)
+      if (!trim(line).empty()) entries.back().found[key_].push_back({words_of(line), trim(line), number});
+  }
+
+  const std::string& file_;
+  std::string section_, key_, open_;
+  Give give_ = nullptr;
+  int since_ = 0, unclosed_ = 0;
+};
+
+OpticalFile read_database(const std::vector<std::string>& lines, const std::string& file) {
+  OpticalFile out;
+  const Database database(lines, file);
+  out.source = database.source;
+  for (const Entry& entry : database.entries) {
     const std::string where = fmt::format("{} line {}", file, entry.line);
     const std::vector<std::string> type = words_of(entry.type);
     const bool is_table = type.size() == 2 && type[0] == "tabulated";
@@ -213,18 +314,30 @@ OpticalFile read_database(const std::vector<std::string>& lines, const std::stri
   return out;
 }
 
+std::string lower(std::string text) {
+  std::ranges::transform(text, text.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  return text;
+}
+
+bool is_yaml(const std::string& name) {
+  const std::string plain = lower(name);
+  return plain.ends_with(".yml") || plain.ends_with(".yaml");
+}
+
 }  // namespace
 
 bool is_optical_file(std::string name) {
-  std::ranges::transform(name, name.begin(), [](unsigned char c) { return char(std::tolower(c)); });
-  return name.ends_with(".csv") || name.ends_with(".txt") || name.ends_with(".yml") || name.ends_with(".yaml");
+  name = lower(name);
+  return name.ends_with(".csv") || name.ends_with(".txt") || is_yaml(name);
 }
 
 OpticalFile read_optical_file(const std::filesystem::path& path) {
   const std::string file = path.string();
   const std::vector<std::string> lines = read_lines(path);
-  const bool is_database = std::ranges::any_of(
-      lines, [](const std::string& line) { return line.starts_with("DATA:") && trim(line) == "DATA:"; });
+  const bool is_database =
+      std::ranges::any_of(lines, [](const std::string& line) { return key_and_rest(line).first == "DATA"; });
+  if (!is_database && is_yaml(file))
+    input_error("{}: expected a file of refractiveindex.info's database (YAML), with a list DATA, found none", file);
   OpticalFile out = is_database ? read_database(lines, file) : read_export(lines, file);
   if (out.n.empty() && is_database) input_error("{}: expected n under DATA, found none", file);
   if (out.n.empty()) input_error("{}: expected a line wl,n and rows below it, found no n", file);

@@ -100,6 +100,10 @@ class MaterialReader {
             resolved["parameters"][name] = value.json();
           }
         }
+      if (m.has("optical"))
+        for (const auto& [name, value] : clear_inside(info))
+          if (!material.varying.count(name) && material.values.try_emplace(name, value).second)
+            resolved["parameters"].update(to_json({{name, value}}));
       if (const auto v = m.find("representation")) material.representation = v->text();
       resolved["representation"] = material.representation;
       try {

@@ -6,6 +6,7 @@ import math
 import re
 
 from . import _optics
+from . import _yaml_styles as yaml_styles
 
 #: Distance in nm of the wavelengths at which a formula is tabulated: that of the observer's tables.
 _STEP = 5
@@ -120,47 +121,133 @@ def _add_formula(found, formula, entry, where):
         )
     if None in span or len(span) != 2 or not span[0] < span[1]:
         raise ValueError(f"{where}: expected a wavelength_range of two numbers in µm")
+    first, last = (end / 1000 for end in _optics.NEEDED)
+    if span[0] > first or span[1] < last:
+        raise ValueError(
+            f"{where}: expected a formula for {first:g} to {last:g} µm, got one for {span[0]:g} to "
+            f"{span[1]:g} µm"
+        )
     low, high = max(1000 * span[0], _optics.SEEN[0]), min(1000 * span[1], _optics.SEEN[1])
     count = max(math.ceil((high - low) / _STEP), 0)
     for nm in (*(low + _STEP * i for i in range(count)), high):
         found["n"].append((nm / 1000, _of_formula(formula, c, nm / 1000), entry["line"]))
 
 
-def _entries(lines, path):
+class _Database:
     """The list under DATA, and the text under REFERENCES. An entry has its type and its line, and
     by key (words, text, line) of each line of its value."""
-    entries, references, section, key = [], [], "", ""
-    for number, full in enumerate(lines, 1):
+
+    def __init__(self, lines, path):
+        self.entries, self._references = [], []
+        self._path, self._section, self._key = path, "", ""
+        self._open, self._unclosed, self._give, self._since = [], 0, None, 0
+        for number, full in enumerate(lines, 1):
+            if self._give:
+                self._open.append(full)
+                self._unclosed += yaml_styles.unclosed(full)
+                # Reading a long table anew at each line would take long.
+                if yaml_styles.may_end(self._open[0], full, self._unclosed):
+                    self._styled("\n".join(self._open), self._give, self._since)
+            else:
+                self._read(full, number)
+        if self._give:
+            self._fail(self._since, self._open[0])
+
+    @property
+    def source(self):
+        return " ".join(self._references)
+
+    def _fail(self, line, text, expected="a string, a list or a mapping of YAML"):
+        got = text.split("\n")[0].strip(" \t")
+        raise ValueError(f"{self._path} line {line}: expected {expected}, got '{got}'")
+
+    def _read(self, full, number):
         line = full.strip(" \t")
         if not line or line.startswith("#"):
-            continue
-        if re.match(r"[A-Za-z][^:]*:", full):
-            section, line = (part.strip(" \t") for part in full.split(":", 1))
-            line, key = "" if line in _BLOCKS else line, ""
-        if section == "REFERENCES" and line:
-            references.append(re.sub(r"<[^>]*(>|$)", "", line))
-        if section != "DATA" or not line:
-            continue
+            return
+        key, rest = yaml_styles.key_and_rest(full)
+        if key:
+            self._section, self._key, line = key, "", rest.strip(" \t")
+            if key == "REFERENCES" and yaml_styles.is_styled(line):
+                self._styled(line, self._refer, number)
+                return
+            line = "" if line in _BLOCKS or line.startswith("#") else line
+        if self._section == "REFERENCES" and line:
+            self._refer(line, number)
+        elif self._section == "DATA" and line:
+            self._entry(line, number)
+
+    def _refer(self, text, number):
+        self._references.append(re.sub(r"<[^>]*(>|$)", "", str(text)).strip())
+
+    def _entry(self, line, number):
+        """A line under DATA."""
+        if line.startswith("["):
+            self._styled(line, self._add_all, number)
+            return
         if line.startswith("- "):
-            entries.append({"type": "", "line": number})
+            self.entries.append({"type": "", "line": number})
             line = line[2:].strip(" \t")
-        if not entries:
-            raise ValueError(f"{path} line {number}: expected '- type: ...', got '{line}'")
-        if ":" in line:
-            key, line = line.split(":", 1)
-            line = line.strip(" \t").replace('"', "")
-            if key == "type":
-                entries[-1] |= {"type": line, "line": number}
-            if key in ("type", "line") or line in _BLOCKS:
-                continue
-        entries[-1].setdefault(key, []).append((line.split(), line, number))
-    return entries, " ".join(references)
+        if not self.entries:
+            self._fail(number, line, "'- type: ...'")
+        if line.startswith("{"):
+            self._styled(line, self._add_keys, number)
+            return
+        key, rest = yaml_styles.key_and_rest(line)
+        if key:
+            self._key, line = key, rest.strip(" \t")
+            if yaml_styles.is_styled(line):
+                self._styled(line, self._add, number)
+                return
+            if line in _BLOCKS:
+                return
+        self._add(line, number)
+
+    def _styled(self, text, give, number):
+        """Gives the value that a text is to a function, perhaps after further lines."""
+        try:
+            value = yaml_styles.value(text)
+        except yaml_styles.Open:
+            self._open, self._unclosed = [text], yaml_styles.unclosed(text)
+            self._give, self._since = give, number
+            return
+        except ValueError:
+            self._fail(number, text)
+        self._give = None
+        give(value, number)
+
+    def _add_all(self, found, number):
+        for keys in found:
+            self.entries.append({"type": "", "line": number})
+            self._add_keys(keys, number)
+
+    def _add_keys(self, keys, number):
+        if not isinstance(keys, dict):
+            self._fail(number, str(keys), "'- type: ...'")
+        for self._key, value in keys.items():
+            self._add(value, number)
+
+    def _add(self, value, number):
+        """Adds lines to the value of the present key."""
+        if isinstance(value, dict):
+            self._fail(number, self._key, "numbers")
+        if isinstance(value, list):
+            rows = value if value and isinstance(value[0], list) else [value]
+            value = "\n".join(" ".join(map(str, row)) for row in rows)
+        entry = self.entries[-1]
+        if self._key == "type":
+            entry |= {"type": value.strip(" \t"), "line": number}
+            return
+        lines = [line for line in value.split("\n") if line.strip(" \t")]
+        # A file may not set the number of the line.
+        place = entry.setdefault("_" if self._key == "line" else self._key, [])
+        place += [(line.split(), line.strip(" \t"), number) for line in lines]
 
 
 def _read_database(lines, path):
     found = {"n": [], "k": []}
-    entries, source = _entries(lines, path)
-    for entry in entries:
+    database = _Database(lines, path)
+    for entry in database.entries:
         where = f"{path} line {entry['line']}"
         kind, _, which = entry["type"].partition(" ")
         if kind == "tabulated" and which in ("n", "k", "nk"):
@@ -177,14 +264,26 @@ def _read_database(lines, path):
                 f"'{entry['type']}'; the page of the substance on refractiveindex.info has its "
                 "table under Data > CSV"
             )
-    return "", source, found
+    return "", database.source, found
+
+
+def _is_database(lines, path):
+    """Whether a file has a list DATA. By its name it has to."""
+    if any(yaml_styles.key_and_rest(line)[0] == "DATA" for line in lines):
+        return True
+    if path.suffix.lower() in (".yml", ".yaml"):
+        raise ValueError(
+            f"{path}: expected a file of refractiveindex.info's database (YAML), with a list DATA, "
+            "found none"
+        )
+    return False
 
 
 def read_file(path):
     """(label, source, {"n": rows, "k": rows}) of a file; a row is (wavelength, value, line). Raises
     OSError, and ValueError naming file, line and what was expected."""
     lines = _plain_text(path).split("\n")
-    is_database = any(line.rstrip(" \t") == "DATA:" for line in lines)
+    is_database = _is_database(lines, path)
     label, source, found = (_read_database if is_database else _read_export)(lines, path)
     if not found["n"] and is_database:
         raise ValueError(f"{path}: expected n under DATA, found none")

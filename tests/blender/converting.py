@@ -60,7 +60,8 @@ def played(socket):
 
 def picture_node(tree, *pixels, data=True):
     """An Image Texture with one row of pixels, (r, g, b) or (r, g, b, a) each."""
-    image = bpy.data.images.new("Image", len(pixels), 1, alpha=True, is_data=data)
+    floats = {"float_buffer": max(map(max, pixels)) > 1}  # bytes can't exceed 1
+    image = bpy.data.images.new("Image", len(pixels), 1, alpha=True, is_data=data, **floats)
     image.pixels.foreach_set(np.array([(*p, 1.0)[:4] for p in pixels], np.float32).ravel())
     image.pack()
     node = tree.nodes.new("ShaderNodeTexImage")

@@ -132,6 +132,7 @@ def test_a_file_of_measurements_sets_glass(extension, empty, tmp_path):
         "ior": pytest.approx(1.527, abs=1e-3),
         # 20 (n_F - n_C) / (n_d - 1) for a straight line.
         "dispersion": pytest.approx(20 * 0.03 / 0.55 * (0.65627 - 0.48613) / 0.527, rel=1e-2),
+        "attenuation": (1.0, 1.0, 1.0),  # no k: nothing is absorbed
     }
     before = extension.api.get_parameters(glass)
     for name, expected in (
@@ -177,6 +178,37 @@ def test_a_substance_that_a_scenes_own_extension_lacks(
     with pytest.raises(ValueError, match=f"was built for one scene: {folded} of .* can't be those"):
         api.set_substance(material, other)
     assert api.get_parameters(material) == before
+
+
+def test_nothing_remains_of_an_earlier_substance(extension, empty, tmp_path):
+    """Neither its absorption nor a metal's tint; and a new glass is green until it is told."""
+    api, clear = extension.api, tmp_path / "clear.csv"
+    clear.write_text("wl,n\n0.35,1.54\n0.9,1.51\n", encoding="utf-8")
+    coloured = tmp_path / "coloured.csv"
+    coloured.write_text("wl,n,k\n0.35,1.5,0\n0.6,1.5,2e-6\n0.9,1.5,0\n", encoding="utf-8")
+    for model in api.models():
+        for before, after in (
+            (coloured, clear),
+            ("gold", clear),
+            (clear, "gold"),
+            ("gold", "gold"),
+        ):
+            changed, fresh = api.new_material(model), api.new_material(model)
+            try:
+                api.set_substance(changed, str(before))
+            except ValueError:
+                continue  # not for this kind
+            try:
+                api.set_substance(changed, str(after))
+            except ValueError:
+                continue
+            api.set_substance(fresh, str(after))
+            got, wanted = api.get_parameters(changed), api.get_parameters(fresh)
+            got.pop("density", None), wanted.pop("density", None)  # of nothing
+            assert got == wanted, (model, before, after)
+    glass = api.new_material("glass")
+    api.set_substance(glass, "diamond")
+    assert api.get_parameters(glass)["attenuation"] == (1.0, 1.0, 1.0)
 
 
 def test_glass_absorbs_what_k_says(extension, empty, color, tmp_path):
@@ -226,7 +258,7 @@ def test_the_button_sets_what_is_absorbed(extension, empty):
     red, green, blue = values["attenuation"]
     assert 0.7 < red < 0.76 and 0.95 < green < blue < 0.98 and values["density"] == 1
     assert bpy.ops.brdfc.substance(substance="silica") == {"FINISHED"}
-    assert extension.api.get_parameters(material)["attenuation"] == (red, green, blue)
+    assert extension.api.get_parameters(material)["attenuation"] == (1, 1, 1)  # it has no k
 
 
 def test_the_button_sets_a_metal(extension, empty, tmp_path):

@@ -7,6 +7,7 @@ import json
 import re
 import subprocess
 import sys
+import time
 
 import numpy as np
 import PyOpenColorIO as ocio
@@ -145,6 +146,16 @@ ENCODED = {
     b"        0.8 0.3 4\nCONDITIONS:\n  temperature: 300\n",
     "YAML of two tables": b"DATA:\n- type: tabulated n\n  data: |\n    0.35 0.2\n    0.5 0.4\n"
     b"    0.8 0.3\n- type: tabulated k\n  data: |\n    0.35 3\n    0.5 3.5\n    0.8 4\n",
+    # The styles in which libraries write the same.
+    "YAML in double quotes": b'DATA:\n- "type": "tabulated nk"\n  "data": "0.35 0.2 3\\n'
+    b'0.5 0.4 3.5\\n\\\n    \\ 0.8 0.3 4\\n"\n',
+    "YAML in single quotes": b"'DATA':\n- data: '0.35 0.2 3\n\n    0.5 0.4 3.5\n\n    0.8 0.3 4\n\n"
+    b"    '\n  type: 'tabulated nk'\n",
+    "YAML in braces": b'DATA: # of a device\n  - {type: tabulated n, data: "0.35 0.2\\n0.5 0.4\\n'
+    b'0.8 0.3"}\n'
+    b"  - {data: [[0.35, 3], [0.5, 3.5],\n      [0.8, 4]], type: tabulated k}\n",
+    "YAML as JSON": b'"DATA": [\n  {\n    "type": "tabulated nk",\n'
+    b'    "data": "0.35 0.2 3\\n0.5 0.4 3.5\\n0.8 0.3 4\\n"\n  }\n]\n',
 }
 
 
@@ -162,6 +173,26 @@ def test_a_table_is_read_however_it_is_written(tmp_path, optics, way):
     assert told["label"] == package.label == label
     if way == "YAML":
         assert package.source == told["source"] == "A. Nyone. Own data (2020)"
+
+
+@pytest.mark.parametrize("style", ["quotes", "brackets", "open"])
+def test_long_tables_of_yaml_are_read_in_linear_time(tmp_path, optics, style):
+    rows = [f"{0.3 + i / 20000:.5f} 1.5" for i in range(12000)]
+    if style == "quotes":
+        data = "'" + "\n\n    ".join(rows) + "'"
+    else:
+        data = "[" + ",\n    ".join(f"[{row.replace(' ', ', ')}]" for row in rows)
+        data += "]" if style == "brackets" else ""
+    file = tmp_path / "own.yml"
+    file.write_text(f"DATA:\n  - type: tabulated n\n    data: {data}\n")
+    before = time.process_time()
+    if style == "open":
+        with pytest.raises(ValueError, match="line 3: expected a string, a list"):
+            optics.read(file)
+        assert run("optical", file).returncode == 2
+    else:
+        assert len(optics.read(file).n.nm) == 12000 and optical(file)["n_d"] == 1.5
+    assert time.process_time() - before < 5
 
 
 #: Published coefficients, and n at the line d (587.56 nm) from the same publications: fused silica
@@ -183,11 +214,20 @@ FORMULAS = {
 def test_formulas_of_the_database_are_tabulated(tmp_path, optics, formula):
     coefficients, index = FORMULAS[formula]
     file = tmp_path / "own.yml"
-    file.write_text(
-        f"DATA:\n  - type: formula {formula}\n    wavelength_range: 0.35 1.1\n"
+    of_k = "  - type: tabulated k\n    data: |\n        0.38 1E-7\n        0.75 2E-7\n"
+    plain = (
+        f"  - type: formula {formula}\n    wavelength_range: 0.35 1.1\n"
         f"    coefficients: {coefficients}\n"
-        "  - type: tabulated k\n    data: |\n        0.38 1E-7\n        0.75 2E-7\n"
     )
+    listed = coefficients.replace(" ", ", ")
+    styled = (
+        f'  - {{type: "formula {formula}", wavelength_range: [0.35, 1.1],\n'
+        f"     coefficients: [{listed}]}}\n"
+    )
+    file.write_text(f"DATA:\n{styled}{of_k}")
+    told = optical(file)
+    file.write_text(f"DATA:\n{plain}{of_k}")
+    assert optical(file) == told
     told, package = optical(file), optics.read(file)
     assert told["n_d"] == pytest.approx(index, abs=1e-5)
     assert package.index_d == pytest.approx(told["n_d"], rel=1e-12)
@@ -287,7 +327,12 @@ def test_a_scene_states_the_thickness(tmp_path):
         assert got["attenuation"] == pytest.approx(np.clip(told["transmittance"], 1e-4, 1))
     # A surface without an inside does not absorb.
     assert "attenuation" not in resolved(model="fresnel_dielectric", optical="green.csv")
-    assert set(resolved(model="glass", optical="silica")) == {"ior", "dispersion"}
+    # Without k nothing is absorbed, unless the scene says so.
+    clear = resolved(model="glass", optical="silica")
+    assert set(clear) == {"ior", "dispersion", "attenuation"} and clear["attenuation"] == [1, 1, 1]
+    green = {"attenuation": [0.2, 0.9, 0.3], "density": 2}
+    found = resolved(model="glass", optical="silica", parameters=green)
+    assert {name: found[name] for name in green} == green
     for material, expected in (
         ({"optical": "silica", "thickness": 1}, "silica has no k to absorb by"),
         ({"thickness": 1}, 'materials.m.thickness: expected "optical" beside it'),
@@ -410,7 +455,35 @@ BAD = {
     "expected coefficients of formula 2, a number and pairs of numbers",
     "DATA:\n  - type: formula 2\n    coefficients: 0 1 0.1\n": " line 2: expected a "
     "wavelength_range of two numbers in µm",
+    # The range of a formula, as it stands in the file.
+    "DATA:\n- type: formula 2\n  wavelength_range: 1 5\n  coefficients: 0 1 0.1\n": " line 2: "
+    "expected a formula for 0.43 to 0.65 µm, got one for 1 to 5 µm",
+    "DATA:\n- type: formula 2\n  wavelength_range: 0.2 0.5\n  coefficients: 0 1 0.1\n": " line 2: "
+    "expected a formula for 0.43 to 0.65 µm, got one for 0.2 to 0.5 µm",
+    'DATA:\n- type: "tabulated n\n  data: |\n    0.3 1\n': " line 2: expected a string, a list or "
+    "a mapping of YAML, got '\"tabulated n'",
+    "DATA:\n  - {type tabulated n}\n": " line 2: expected a string, a list or a mapping of YAML, "
+    "got '{type tabulated n}'",
+    "DATA:\n  - type: tabulated n\n    data: {a: 1}\n": " line 3: expected numbers, got 'data'",
+    "DATA: [1, 2]\n": " line 1: expected '- type: ...', got '1'",
+    f"DATA: {'[' * 100_000}\n": f" line 1: expected a string, a list or a mapping of YAML, got "
+    f"'{'[' * 100_000}'",
 }
+
+
+@pytest.mark.parametrize("ending", ["yml", "YAML"])
+@pytest.mark.parametrize("text", ["", "wl,n\n0.3,1.5\n", "BOOK: glass\n", '{"DATA": []}'])
+def test_a_yaml_file_without_data_is_told_its_format(tmp_path, optics, text, ending):
+    file = tmp_path / f"own.{ending}"
+    file.write_text(text, encoding="utf-8")
+    done = run("optical", file)
+    message = (
+        f"{file}: expected a file of refractiveindex.info's database (YAML), with a list DATA, "
+        "found none"
+    )
+    assert done.returncode == 2 and done.stderr == f"brdfc: {message}\n"
+    with pytest.raises(ValueError, match=re.escape(message)):
+        optics.read(file)
 
 
 @pytest.mark.parametrize("text", BAD, ids=range(len(BAD)))
@@ -454,7 +527,8 @@ def test_a_scene_names_a_substance_or_a_file(tmp_path):
     gold = optical("gold")
     of_channels = [found["a"]["parameters"][f"{q}_{c}"] for q in "nk" for c in "rgb"]
     assert of_channels == pytest.approx([*gold["n"], *gold["k"]])
-    assert found["b"]["parameters"] == {"ior": 1.5, "dispersion": 0, "density": 0}
+    clear = {"ior": 1.5, "dispersion": 0, "density": 0, "attenuation": [1, 1, 1]}
+    assert found["b"]["parameters"] == clear
     # 20 divided by the Abbe number.
     assert resolved(b={"model": "fresnel_dielectric", "optical": "sf11"}).returncode == 0
     found = json.loads((tmp_path / "out" / "scene.json").read_text())["materials"]
