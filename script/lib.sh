@@ -4,7 +4,7 @@
 
 ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 BUILD=$ROOT/build
-ENVS=$ROOT/.env
+ENVS=$(realpath -m "$ROOT/.env") # where it is, if it is a link: the programs in environments contain that path
 TOOL=$BUILD/brdfc
 # The oiiotool of the tools' environment, because the first in PATH may be any version.
 OIIOTOOL=$ENVS/tools/bin/oiiotool
@@ -85,8 +85,11 @@ PY
   return 1
 }
 
-env_is_ready() { # env_is_ready FOLDER STAMP
-  [ "$(cat "$1/.stamp" 2>/dev/null)" = "$2" ] && "$1/bin/python" -c '' 2>/dev/null
+# env_is_ready FOLDER STAMP: whether it has those requirements, and its interpreter and programs run. Programs of an environment
+# begin with the path of its interpreter, which is no longer there when the environment has been moved.
+env_is_ready() {
+  [ "$(cat "$1/.stamp" 2>/dev/null)" = "$2" ] && "$1/bin/python" -c '' 2>/dev/null &&
+    [ -x "$(sed -n '1s/^#!//p' "$1/bin/pip" 2>/dev/null)" ]
 }
 
 # setup_env NAME PYTHON-VERSION: makes .env/NAME from script/requirements/NAME.txt. Does nothing, and uses no network,
