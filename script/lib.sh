@@ -149,14 +149,15 @@ setup_farm() {
 
 # ---- build -----------------------------------------------------------------------------------------------
 
-# slowest_sources FOLDER: the five sources in FOLDER's Ninja log that took longest to compile, in seconds of wall time.
-# Sources that were in the compiler cache take almost no time.
+# slowest_sources FOLDER: the five sources in FOLDER that took longest to compile, in seconds of processor time, and the sum of
+# all. Sources that were in the compiler cache take almost no time.
 slowest_sources() {
-  [ -f "$1/.ninja_log" ] || return 0
-  note "The slowest sources of ${1#"$ROOT"/}, in seconds:"
-  awk -F '\t' '$4 ~ /\.o$/ { seconds[$4] = ($2 - $1) / 1000 }
-    END { for (object in seconds) printf "%8.1f  %s\n", seconds[object], object }' "$1/.ninja_log" |
-    sort -rn | sed -n -e 's,CMakeFiles/,,' -e 's,\.o$,,' -e 1,5p  # reads all, or else sort would fail now and then
+  [ -f "$1/compile_times" ] || return 0
+  note "The slowest sources of ${1#"$ROOT"/}, in seconds of processor time:"
+  awk -F '\t' '{ seconds[$2] = $1 }
+    END { for (object in seconds) { sum += seconds[object]; ++count; printf "%8.1f  %s\n", seconds[object], object }
+          printf "%8.1f  all %d sources\n", sum, count }' "$1/compile_times" |
+    sort -rn | sed -n -e 's,CMakeFiles/,,' -e 's,\.o$,,' -e 1,6p  # reads all, or else sort would fail now and then
 }
 
 build_preset() { # build_preset PRESET [TARGET...]
