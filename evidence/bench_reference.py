@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compares `brdfc render` with Mitsuba 3, in paths per second: same triangles, lamp and camera.
 
-    python evidence/bench_reference.py [--brdfc build/brdfc] [--json out.json]
+    python evidence/bench_reference.py [--brdfc build/brdfc [OTHER...]] [--json out.json]
 
 Needs the Python packages mitsuba and numpy. Mitsuba's llvm_ad_rgb also needs a compatible LLVM
 library (19 works, 14 does not; DRJIT_LIBLLVM_PATH selects one). In the scene everything is grey and
@@ -9,7 +9,9 @@ diffuse: a sphere of 32,512 triangles and two boxes on a floor under a rectangul
 renderers use the same number of samples and the same path depth, and sample both lamp and BRDF. The
 means of the two pictures are compared, to make sure that neither renderer computes less. All
 renderers use the same number of threads, and the best of several runs counts. --cpu measures CPU
-time, which is affected less by other load on the machine. Exit status 1: the pictures differ.
+time, which is affected less by other load on the machine. Several tools after --brdfc, such as
+those before and after a change, run in turns; --scene renders a scene file in place of that one, by
+the tools alone. Exit status 1: the pictures differ.
 """
 
 import argparse
@@ -17,6 +19,7 @@ import json
 import math
 import os
 import resource
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -77,14 +80,10 @@ def cpu_seconds(command):
 
 
 def run_brdfc(brdfc, folder, args):
-    """Seconds of tracing, and the picture's mean. For Mitsuba, too, the time begins when the scene
-    is ready."""
-    scene = {**SCENE, "settings": SCENE["settings"] | {"width": args.size, "height": args.size}}
-    (folder / "scene.json").write_text(json.dumps(scene))
-    resolve = [brdfc, "scene", folder / "scene.json", "--out", folder / "resolved"]
-    subprocess.run(resolve, check=True, stderr=subprocess.DEVNULL)
+    """Seconds of tracing, the picture's mean, and the number of paths. For Mitsuba, too, the time
+    begins when the scene is ready."""
     out = folder / "brdfc.exr"
-    command = [brdfc, "render", folder / "scene.json", "--out", out]
+    command = [brdfc, "render", args.scene or folder / "scene.json", "--out", out]
     command += ["--threads", args.threads, "--spp"]
     # For CPU times, the time with one sample, which includes loading, is subtracted.
     ready = cpu_seconds([*command, 1]) if args.cpu else 0
@@ -95,8 +94,16 @@ def run_brdfc(brdfc, folder, args):
     if not args.cpu:
         seconds = float(bitmap.metadata()["brdfc:seconds_tracing"])
     names = [field.name for field in bitmap.struct_()]
-    wanted = [names.index(c) for c in "RGB"]
-    return seconds, float(np.array(bitmap)[..., wanted].mean())
+    picture = np.array(bitmap)[..., [names.index(c) for c in "RGB"]]
+    return seconds, float(picture.mean()), picture.shape[0] * picture.shape[1] * args.spp
+
+
+def write_scene(brdfc, folder, args):
+    """The scene file, and its meshes for Mitsuba."""
+    scene = {**SCENE, "settings": SCENE["settings"] | {"width": args.size, "height": args.size}}
+    (folder / "scene.json").write_text(json.dumps(scene))
+    resolve = [brdfc, "scene", folder / "scene.json", "--out", folder / "resolved"]
+    subprocess.run(resolve, check=True, stderr=subprocess.DEVNULL)
 
 
 def mitsuba_scene(mi, folder, args):
@@ -212,7 +219,8 @@ def run_mitsuba(variant, folder, args):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     root = Path(__file__).resolve().parents[1]
-    parser.add_argument("--brdfc", default=str(root / "build" / "brdfc"))
+    parser.add_argument("--brdfc", nargs="+", default=[str(root / "build" / "brdfc")])
+    parser.add_argument("--scene", help="a scene file, rendered by brdfc alone")
     parser.add_argument("--size", type=int, default=256, help="pixels along each side")
     parser.add_argument("--spp", type=int, default=32)
     parser.add_argument("--runs", type=int, default=3)
@@ -224,30 +232,36 @@ def main():
     if args.in_process:
         time_mitsuba(args.in_process[0], Path(args.in_process[1]), args)
         return 0
-    if not Path(args.brdfc).is_file():
-        print(f"bench_reference: {args.brdfc}: no such program", file=sys.stderr)
-        return 2
+    for path in [*args.brdfc, *filter(None, [args.scene])]:
+        if not Path(path).is_file():
+            print(f"bench_reference: {path}: no such file", file=sys.stderr)
+            return 2
     try:
         import mitsuba as mi
     except ImportError:
         print("bench_reference: this Python has no mitsuba package", file=sys.stderr)
         return 2
     mi.set_variant("scalar_rgb")
-    paths = args.size * args.size * args.spp
     rows = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        runs = [run_brdfc(args.brdfc, folder, args) for _ in range(args.runs)]
-        rows.append(("brdfc", *min(runs)))
-        for variant in ("scalar_rgb", "llvm_ad_rgb"):
+        write_scene(args.brdfc[-1], folder, args)
+        turns = [[run_brdfc(tool, folder, args) for tool in args.brdfc] for _ in range(args.runs)]
+        for tool, runs in zip(args.brdfc, zip(*turns, strict=True), strict=True):
+            seconds, mean, paths = min(runs)
+            rows.append((tool if len(args.brdfc) > 1 else "brdfc", seconds, mean))
+            middle = statistics.median(run[0] for run in runs)
+            print(f"{rows[-1][0]}: median of {args.runs} runs {middle:.3f} s", file=sys.stderr)
+        for variant in () if args.scene else ("scalar_rgb", "llvm_ad_rgb"):
             result = run_mitsuba(variant, folder, args)
             if result:
                 rows.append((f"mitsuba {variant}", *result))
-    print(f"{'renderer':<20} {'seconds':>8} {'Mpaths/s':>9} {'speed':>6} {'mean':>9}")
+    width = max(20, *(len(row[0]) for row in rows))
+    print(f"{'renderer':<{width}} {'seconds':>8} {'Mpaths/s':>9} {'speed':>6} {'mean':>9}")
     base = next((row[1] for row in rows if row[0].endswith("scalar_rgb")), rows[0][1])
     for label, seconds, mean in rows:
         rate = paths / seconds * 1e-6
-        print(f"{label:<20} {seconds:8.3f} {rate:9.3f} {base / seconds:6.2f} {mean:9.6f}")
+        print(f"{label:<{width}} {seconds:8.3f} {rate:9.3f} {base / seconds:6.2f} {mean:9.6f}")
     if args.json:
         table = [
             {"renderer": r, "seconds": s, "paths_per_second": paths / s, "mean": m}

@@ -4,7 +4,7 @@
 
 ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 BUILD=$ROOT/build
-ENVS=$ROOT/.env
+ENVS=$(realpath -m "$ROOT/.env") # where it is, if it is a link: the programs in environments contain that path
 TOOL=$BUILD/brdfc
 # The oiiotool of the tools' environment, because the first in PATH may be any version.
 OIIOTOOL=$ENVS/tools/bin/oiiotool
@@ -85,8 +85,11 @@ PY
   return 1
 }
 
-env_is_ready() { # env_is_ready FOLDER STAMP
-  [ "$(cat "$1/.stamp" 2>/dev/null)" = "$2" ] && "$1/bin/python" -c '' 2>/dev/null
+# env_is_ready FOLDER STAMP: whether it has those requirements, and its interpreter and programs run. Programs of an environment
+# begin with the path of its interpreter, which is no longer there when the environment has been moved.
+env_is_ready() {
+  [ "$(cat "$1/.stamp" 2>/dev/null)" = "$2" ] && "$1/bin/python" -c '' 2>/dev/null &&
+    [ -x "$(sed -n '1s/^#!//p' "$1/bin/pip" 2>/dev/null)" ]
 }
 
 # setup_env NAME PYTHON-VERSION: makes .env/NAME from script/requirements/NAME.txt. Does nothing, and uses no network,
@@ -146,14 +149,15 @@ setup_farm() {
 
 # ---- build -----------------------------------------------------------------------------------------------
 
-# slowest_sources FOLDER: the five sources in FOLDER's Ninja log that took longest to compile, in seconds of wall time.
-# Sources that were in the compiler cache take almost no time.
+# slowest_sources FOLDER: the five sources in FOLDER that took longest to compile, in seconds of processor time, and the sum of
+# all. Sources that were in the compiler cache take almost no time.
 slowest_sources() {
-  [ -f "$1/.ninja_log" ] || return 0
-  note "The slowest sources of ${1#"$ROOT"/}, in seconds:"
-  awk -F '\t' '$4 ~ /\.o$/ { seconds[$4] = ($2 - $1) / 1000 }
-    END { for (object in seconds) printf "%8.1f  %s\n", seconds[object], object }' "$1/.ninja_log" |
-    sort -rn | sed -n -e 's,CMakeFiles/,,' -e 's,\.o$,,' -e 1,5p  # reads all, or else sort would fail now and then
+  [ -f "$1/compile_times" ] || return 0
+  note "The slowest sources of ${1#"$ROOT"/}, in seconds of processor time:"
+  awk -F '\t' '{ seconds[$2] = $1 }
+    END { for (object in seconds) { sum += seconds[object]; ++count; printf "%8.1f  %s\n", seconds[object], object }
+          printf "%8.1f  all %d sources\n", sum, count }' "$1/compile_times" |
+    sort -rn | sed -n -e 's,CMakeFiles/,,' -e 's,\.o$,,' -e 1,6p  # reads all, or else sort would fail now and then
 }
 
 build_preset() { # build_preset PRESET [TARGET...]

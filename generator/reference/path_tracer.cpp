@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "reference/path_tracer.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "model/horizon.h"
@@ -177,7 +178,8 @@ void PathTracer::scatter(int material, int place, int bounce, Wave& wave) const 
   Surface::Scratch& scratch = wave.scratch.of(material);
   Block& b = *wave.block;
   const std::uint64_t dimension = dimension_of(bounce);
-  make_frames(surface, b);
+  if (surface.bends_normals()) bend_normals(b);
+  make_frames(surface.has_transmit() || surface.scatters_through(), b);
   for (int far = 0; far < 2; ++far)
     if (surface.has_scatter() && !lights_.empty() && (!far || surface.scatters_through()))
       aim(far, bounce, wave);
@@ -214,18 +216,30 @@ void PathTracer::scatter(int material, int place, int bounce, Wave& wave) const 
   }
 }
 
-BRDFC_VECTORISED void PathTracer::make_frames(const Surface& surface, Block& b) {
-  const bool two_sided = surface.has_transmit() || surface.scatters_through(), bends = surface.bends_normals();
+BRDFC_VECTORISED void PathTracer::bend_normals(Block& b) {
+  Numbers rise;
+  for_lanes(b.count,
+            [&](std::size_t k) { rise[k] = mirror_rise(b.hits.geometric[k], -b.rays.direction[k], b.hits.normal[k]); });
+  // In most blocks no normal has to be bent.
+  if (!std::any_of(rise.begin(), rise.begin() + std::ptrdiff_t(b.count), [](double r) { return r < 0; })) return;
   for_lanes(b.count, [&](std::size_t k) {
-    const Vector direction = b.rays.direction[k], geometric = b.hits.geometric[k], shading = b.hits.normal[k];
-    const bool bent = bends & (mirror_rise(geometric, -direction, shading) < 0);
-    const Vector normal = select(bent, bent_normal(geometric, -direction, shading), shading);
+    const Vector shading = b.hits.normal[k];
+    b.hits.normal.set(k, select(rise[k] < 0, bent_normal(b.hits.geometric[k], -b.rays.direction[k], shading), shading));
+  });
+}
+
+BRDFC_VECTORISED void PathTracer::make_frames(bool two_sided, Block& b) {
+  // Before the loop, which GCC does not turn into vector instructions if it decides this for each lane.
+  if (two_sided)
+    b.side = b.hits.side;
+  else
+    b.side.fill(1);
+  for_lanes(b.count, [&](std::size_t k) {
+    const Vector direction = b.rays.direction[k], normal = b.hits.normal[k];
     const Vector tangent = unit(b.hits.tangent[k] - normal * dot(normal, b.hits.tangent[k]));
     const Vector bitangent = cross(normal, tangent);
-    b.hits.normal.set(k, normal);
     b.hits.tangent.set(k, tangent);
     Vector wo = raise_to_horizon(Vector{-dot(direction, tangent), -dot(direction, bitangent), -dot(direction, normal)});
-    b.side[k] = two_sided ? b.hits.side[k] : 1;
     wo.z *= b.side[k];
     b.bitangent.set(k, bitangent);
     b.wo.set(k, wo);

@@ -59,11 +59,13 @@ class PathTracer {
   void choose(const Surface& surface, const PackedBrdf& brdf, std::size_t first, int bounce, Wave& wave,
               Lanes<bool>& on) const;
 
-  /// Loops over a block: camera rays through points of the film; random numbers; the shading frames of points;
-  /// directions to lights, into the frames; sampled directions, out of the frames.
+  /// Loops over a block: camera rays through points of the film; random numbers; normals, bent where model/horizon.h
+  /// says so; the shading frames of points; directions to lights, into the frames; sampled directions, out of the
+  /// frames.
   void begin(const Numbers& x, const Numbers& y, Block& b) const;
   static void random(const Block& b, std::uint64_t index, Numbers& out);
-  static void make_frames(const Surface& surface, Block& b);
+  static void bend_normals(Block& b);
+  static void make_frames(bool two_sided, Block& b);
   static void turn_to_lights(bool far, Block& b);
   static void turn_to_world(Block& b);
 

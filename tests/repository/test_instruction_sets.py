@@ -28,3 +28,23 @@ def test_code_for_a_newer_processor_has_names_of_its_own(instructions):
     names = [match[1] for line in lines if (match := re.match(r"[0-9a-f]* +[A-Za-z] (.*)", line))]
     assert len(names) > len(objects)
     assert [name for name in names if instructions not in name] == []
+
+
+@pytest.mark.parametrize("instructions", SETS)
+@pytest.mark.parametrize("loop", ["bend_normals", "make_frames", "turn_to_world"])
+def test_loops_of_the_reference_take_roots_of_several_numbers_at_a_time(loop, instructions):
+    """One line that GCC can't turn into vector instructions makes the whole loop several times
+    slower, and nothing else shows it: bending normals took a sixth of the reference's time."""
+    symbols = subprocess.check_output(["nm", TOOL], text=True).split()
+    clones = [
+        s
+        for s in symbols
+        if f"PathTracer{len(loop)}{loop}E" in s and s.endswith(f"arch_{instructions}")
+    ]
+    if not any(s.endswith(f"arch_{instructions}") for s in symbols):
+        pytest.skip("this compiler makes one version of each function")
+    (clone,) = clones
+    code = subprocess.check_output(["objdump", "-d", f"--disassemble={clone}", TOOL], text=True)
+    roots = re.findall(r"\bvsqrt[sp]d\b", code)
+    assert roots
+    assert set(roots) == {"vsqrtpd"}
