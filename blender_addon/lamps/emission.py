@@ -22,9 +22,9 @@ class _Level(shader_values.Current):
     """The approximate value of an input at the current frame; values that are unknown or vary over
     the surface count as 1."""
 
-    def _output(self, reached):
+    def output(self, reached, of):
         try:
-            return super()._output(reached)
+            return super().output(reached, of)
         except shader_values.Unknown:
             return 1.0
 

@@ -665,6 +665,19 @@ def emissive(strength=50.0, kind="ShaderNodeEmission"):
     return material, node.inputs[name]
 
 
+def test_emission_that_varies_over_a_surface_counts_as_one(lamps, empty):
+    """Only the unknown part of it: a texture times 5 is 5."""
+    material, strength = emissive()
+    tree = material.node_tree
+    texture, times = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("TexVoronoi", "Math"))
+    times.operation = "MULTIPLY"
+    times.inputs[1].default_value = 5.0
+    tree.links.new(texture.outputs["Distance"], times.inputs[0])
+    tree.links.new(times.outputs[0], strength)
+    level = import_module(f"{lamps.__name__}.emission").of_material
+    assert level(material) == pytest.approx(5, rel=1e-5)
+
+
 @pytest.mark.parametrize("kind", ["ShaderNodeEmission", "ShaderNodeBsdfPrincipled"])
 def test_emissive_meshes(extension, ball, empty, kind):
     material, strength = emissive(kind=kind)
