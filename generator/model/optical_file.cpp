@@ -252,9 +252,9 @@ class Database {
 
   void add_keys(const YamlValue& keys, int number) {
     if (keys.kind != YamlValue::Kind::Mapping) fail(number, keys.text, "'- type: ...'");
-    for (const auto& [key, value] : keys.mapping) {
-      key_ = key;
-      add(value, number);
+    for (std::size_t i = 0; i < keys.keys.size(); ++i) {
+      key_ = keys.keys[i];
+      add(keys.list[i], number);
     }
   }
 

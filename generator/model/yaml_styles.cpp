@@ -144,7 +144,8 @@ class Reader {
       const YamlValue key = value();
       if (key.kind != YamlValue::Kind::Text || peek() != ':') throw std::invalid_argument("no key");
       ++at_;
-      out.mapping.emplace_back(key.text, peek() == ',' || peek() == '}' ? YamlValue{} : value());
+      out.keys.push_back(key.text);
+      out.list.push_back(peek() == ',' || peek() == '}' ? YamlValue{} : value());
     });
     return out;
   }

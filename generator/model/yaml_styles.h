@@ -15,8 +15,8 @@ struct YamlValue {
   enum class Kind { Text, List, Mapping };
   Kind kind = Kind::Text;
   std::string text;
-  std::vector<YamlValue> list;
-  std::vector<std::pair<std::string, YamlValue>> mapping;
+  std::vector<YamlValue> list;    ///< of a mapping: its values
+  std::vector<std::string> keys;  ///< their keys
 };
 
 /// True if a text begins with a quote, a bracket or a brace.
