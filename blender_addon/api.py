@@ -33,7 +33,7 @@ from .measured import Measured, MeasuredError
 from .packs import kernel, pack
 from .packs.pack import PackError
 from .packs.parameter_values import equal_in_float32
-from .trees import shader_trees
+from .trees import animation, shader_trees
 from .warnings import checks
 from .warnings.rows import Finding
 
@@ -268,7 +268,8 @@ def set_parameters(material, node=None, **parameters):
     """Sets parameters of a material with one model, or of the one that `node` names. All values are
     checked before any is changed.
 
-    Raises ValueError as new_material does, and for a parameter that a link controls.
+    Raises ValueError as new_material does, and for a parameter that a link or a driver controls. A
+    value that has keys comes back at the next frame.
     """
     found = _the_node(material, node)
     _set(found, say("material {name!r}", name=material.name), parameters)
@@ -293,6 +294,10 @@ def _set(node, what, parameters):
         if name in present and shader_trees.is_driven(present[name]):
             raise ValueError(
                 say("{parameter!r} of {what} is controlled by a link", parameter=name, what=what)
+            )
+        if name in present and animation.has_driver(present[name]):
+            raise ValueError(
+                say("{parameter!r} of {what} is controlled by a driver", parameter=name, what=what)
             )
     for name, value in values.items():
         model_nodes.set_value(node, name, value)

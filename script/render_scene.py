@@ -320,14 +320,15 @@ def main():
     parser.add_argument(
         "--without-osl",
         action="store_true",
-        help="with Open Shading Language off, as files are made: auto is Blender's own nodes then",
+        help="with Open Shading Language off, as in a new file of Blender: auto is then nodes, "
+        "formulas as Blender's math nodes",
     )
     parser.add_argument("--jobs", help="JSON file with a list of jobs")
     parser.add_argument(
         "--representation",
         default="scene",
-        help="scene (as the file says), auto, exact, sampled; glossy, principled or metallic for "
-        "Blender's own nodes",
+        help="scene (as the file says), auto, or a form: exact, aimed, sampled, fitted, nodes or "
+        "twin; glossy, principled or metallic for Blender's own nodes",
     )
     parser.add_argument("--spp", type=int, help="samples a pixel; default: as the scene says")
     parser.add_argument("--seed", type=int, help="random numbers; default: as the scene says")

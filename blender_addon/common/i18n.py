@@ -108,6 +108,12 @@ def form_name(form):
     return _FORM_NAMES.get(form) or Sentence(form.capitalize())
 
 
+def forms_in_scripts(forms):
+    """A list of the names of forms in scripts, with those in the panel where they differ."""
+    shown = {form: f" ({name})" for form, name in _FORM_NAMES.items()}
+    return ", ".join(f"{form}{shown.get(form, '')}" for form in forms)
+
+
 def of_error(error):
     """The text of an error, as a Sentence if it is one, and its technical details: ("...",
     "...")."""

@@ -9,7 +9,7 @@ from functools import cache, cached_property, lru_cache
 from pathlib import Path
 
 from ..common import extension
-from ..common.i18n import form_name, say
+from ..common.i18n import form_name, forms_in_scripts, say
 from .parameter_values import canonical, checked_number, equal_in_float32, is_number, value_text
 
 _INSTALLED = extension.ROOT
@@ -155,11 +155,10 @@ class Model:
         if name == "auto":
             name = self.automatic(values, osl_available()).name
         if name not in self.forms:
-            known = ", ".join(["auto", *sorted(self.forms)])
             raise ValueError(
                 say(
                     "{model} has no render method {form!r}",
-                    more=f"expected one of {known}",
+                    more=f"expected one of {forms_in_scripts(('auto', *sorted(self.forms)))}",
                     model=self.label,
                     form=name,
                 )

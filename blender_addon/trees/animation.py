@@ -49,6 +49,12 @@ def animates(owner, path):
     return any(curve.data_path == path for curve in _curves(owner))
 
 
+def has_driver(socket):
+    """Whether a driver controls the value of an input."""
+    data, path = socket.id_data.animation_data, socket.path_from_id(_VALUE)
+    return data is not None and any(curve.data_path == path for curve in data.drivers)
+
+
 def _targets(tree):
     """Yields (curve, its data-block, the object it animates, the property's name), for everything
     in a tree."""

@@ -361,7 +361,10 @@ def test_values_round_trip(extension, empty, subtests):
     ("arguments", "message"),
     [
         ((["gloss"], {}), r"unknown model 'gloss'; expected one of .*lambert"),
-        ((["coupled", "fitted"], {}), r"has no render method 'fitted'.*auto, aimed"),
+        (
+            (["coupled", "fitted"], {}),
+            r"has no render method 'fitted'.*auto \(Automatic\), aimed, .*nodes \(Formula Nodes\)",
+        ),
         ((["coupled"], {"r1": 0.1}), r"'coupled' has no parameter 'r1'; expected one of r0, rm"),
         ((["coupled"], {"r0": 1.5}), r"coupled\.r0: expected a number from 0 to 1, got 1\.5"),
         ((["coupled"], {"r0": -0.1}), r"coupled\.r0: expected a number from 0 to 1"),
@@ -396,6 +399,11 @@ def test_set_parameters_is_all_or_nothing(extension, empty):
     node = extension.model_nodes.group_nodes(material)[0]
     number = tree.nodes.new("ShaderNodeValue")
     tree.links.new(number.outputs[0], extension.model_nodes.sockets(node)["r0"])
+    sockets = extension.model_nodes.sockets(node)
+    sockets["rm"].driver_add("default_value", 0).driver.expression = "0.5"
+    with pytest.raises(ValueError, match="'rm'.*controlled by a driver"):
+        extension.api.set_parameters(material, rm=0.7)
+    sockets["rm"].driver_remove("default_value", 0)
     with pytest.raises(ValueError, match="'r0'.*controlled by a link"):
         extension.api.set_parameters(material, r0=0.3)
     with pytest.raises(ValueError, match="has 0 reflection models"):
