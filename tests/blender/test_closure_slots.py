@@ -152,6 +152,7 @@ STACK = 255
 LARGEST = {"factors", "microfacet", "phong_material", "radziszewski_alda"}
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(bpy.app.version >= (5, 0, 0), reason="Blender 4.5 logs the use of the stack")
 @pytest.mark.parametrize(
     ("which", "count", "linked"),

@@ -108,6 +108,7 @@ def test_a_model_of_which_nothing_is_made_is_there_with_its_defaults(
         library.entries()
 
 
+@pytest.mark.slow
 def test_what_needs_open_shading_language_says_so(extension, library, empty):
     empty.cycles.shading_system = False
     found = set()

@@ -319,6 +319,7 @@ def small_strip(scene):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_small_strip(extension):
     """Closures within it are so faint that they would be kept at random. So it has a single cone
     around it, about its middle: about the middle of a part, 7 % of the light would be lost."""
@@ -330,6 +331,7 @@ def test_a_small_strip(extension):
     assert noise < 0.01, noise
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "mean_limit", "block_limit"),
     [("cook_torrance", 0.01, 0.05), ("radziszewski_alda", 0.07, 0.15)],
