@@ -206,6 +206,10 @@ def numbers(shape, place=(0, 0, 0), turn=(0, 0, 0), scale=(1, 1, 1), sizes=(0, 0
     return (*place, *turn, *scale, shape if isinstance(shape, Driven) else float(shape), *sizes)
 
 
+def _with_shape(values, shape):
+    return (*values[:_SHAPE], shape, *values[_SHAPE + 1 :])
+
+
 def coded(values, cones, plane):
     """The numbers of a flat lamp that may have this number of cones, in a plane with this number: 0
     if it is alone there."""
@@ -214,7 +218,7 @@ def coded(values, cones, plane):
         shape = replace(shape, added=shape.added + added)
     else:
         shape += added
-    return (*values[:_SHAPE], shape, *values[_SHAPE + 1 :])
+    return _with_shape(values, shape)
 
 
 def _code_of(shape):
@@ -267,15 +271,11 @@ def _as_seen(values):
     return np.concatenate([place, turn[:, 2], np.abs(turn[:, 0]), sides, [shape[0], shape[1] < 0]])
 
 
-def shown_with(values, item):
+def while_rendered(values, item):
     """The numbers of a lamp that are those of an empty slot in frames in which the object is not
     rendered. Beyond that, nothing changes the shape's number while the extension does not run."""
     shape = _now(values[_SHAPE])
-    return (
-        *values[:_SHAPE],
-        Driven(item, "hide_render", EMPTY - shape, shape),
-        *values[_SHAPE + 1 :],
-    )
+    return _with_shape(values, Driven(item, "hide_render", EMPTY - shape, shape))
 
 
 def is_same_lamp(a, b):

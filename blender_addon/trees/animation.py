@@ -49,12 +49,6 @@ def animates(owner, path):
     return any(curve.data_path == path for curve in _curves(owner))
 
 
-def has_driver(socket):
-    """Whether a driver controls the value of an input."""
-    data, path = socket.id_data.animation_data, socket.path_from_id(_VALUE)
-    return data is not None and any(curve.data_path == path for curve in data.drivers)
-
-
 def _targets(tree):
     """Yields (curve, its data-block, the object it animates, the property's name), for everything
     in a tree."""
@@ -73,6 +67,14 @@ def _targets(tree):
 def value_key(socket):
     """The key of a socket's value in the set that animated_properties() returns."""
     return socket.as_pointer(), _VALUE
+
+
+def has_driver(socket):
+    """Whether a driver controls the value of an input."""
+    return any(
+        curve.driver is not None and (found.as_pointer(), name) == value_key(socket)
+        for curve, _, found, name in _targets(socket.id_data)
+    )
 
 
 def animated_properties(node):

@@ -155,7 +155,7 @@ class Light(Kind, ABC):
         sizeless = self.is_sizeless(light)
         values = self.slot(light, slots.placed(item, matrix), sign)
         if item is not None and animation.animates(item, "hide_render"):
-            values = slots.shown_with(values, item)
+            values = slots.while_rendered(values, item)
         return slots.Candidate(
             name,
             values,
