@@ -30,9 +30,9 @@ class _Surface:
         self.path_length = path.outputs["Ray Length"]
         missing = w.math("LESS_THAN", w.vector("LENGTH", normal, output="Value"), 0.5)
         own = w.scaled(geometry.outputs["Normal"], missing)
-        self.normal = w.vector("NORMALIZE", w.vector("ADD", normal, own))
+        self.normal = self.unbent = w.vector("NORMALIZE", w.vector("ADD", normal, own))
         if parts.has("bend"):
-            self.normal = _bent(parts, geometry, self.strand, self.normal)
+            self.normal = _bent(parts, geometry, self.strand, self.unbent)
         self.drawn = _random(w, self, 0.0)
         self.anywhere = _direction(w, *_random(w, self, 1.0)[:2])
         if tangent is None:
@@ -212,7 +212,21 @@ def _wired(w, data, normal, tangent, parameters, of_slots, cones, title):
         lamps = formula_lamps.seen(w, parts, of_slots, cones, here, data["widest"])
     shaders.append(_rest(w, parts, surface, given, lamps, data["narrow"]))
     shaders += formula_lamps.closures(w, parts, lamps, cones, given)
-    return {"BSDF": w.sum(shaders)}
+    total = w.sum(shaders)
+    if parts.has("whole"):
+        found = parts.add("whole", **parameters)
+        for closure in data["whole"]:
+            total = _whole(w, closure, found, surface, total)
+    return {"BSDF": total}
+
+
+def _whole(w, closure, found, surface, otherwise):
+    """A closure of Blender's that equals the model, where it does."""
+    of = {name: found[value] for name, value in closure.items() if name != "kind"}
+    stands = of.pop("stands")
+    # Cycles bends its normal itself.
+    metal = w.metal(closure["kind"], **of, normal=surface.unbent, tangent=surface.tangent)
+    return w.shown(stands, metal, otherwise)
 
 
 def _of_base(w, closure, given, surface):

@@ -24,7 +24,8 @@ enum class ClosureKind {
   DiffuseRamp,  ///< diffuse_ramp(N, colours): ramp8(c) / pi, without a cosine
   PhongRamp,    ///< phong_ramp(N, e, colours): ramp8(cos^e a) (N.wi) (e+2)/(2 pi) cos^e a
   Reflection,   ///< reflection(N): delta in the direction of ideal reflection
-  Ggx,          ///< microfacet("ggx", N, 0, a, a, 1, 0): no Fresnel term, Smith's height-correlated masking
+  Ggx,          ///< microfacet("ggx", N, 0, a, a, 1, 0): no Fresnel term but that of Closure::schlick, Smith's
+                ///< height-correlated masking
   Beckmann,     ///< microfacet("beckmann", ...): the same, with Walter's rational masking as in Cycles
   GlossyToon,   ///< glossy_toon(N, size, smooth): a cone about the mirror direction, constant within `size` and
                 ///< decreasing to 0 over `smooth`, linearly in the angle; without a cosine
@@ -68,8 +69,12 @@ template <class T> struct Closure {
   Rgb<T> albedo;                       ///< OrenNayar: albedo of the facets, from 0 to 1
   T size, smooth;                      ///< toons: in units of 90 degrees, from 0 to 1
   T ior;                               ///< Refraction: index of the far side over that of the viewer's
+  Rgb<T> f0;                           ///< if `schlick`: reflectance of a facet seen from above, from 0 to 1
   bool turned = false;                 ///< true if `normal` is not the surface's; it must not point below the surface
   Tangent stretched = Tangent::None;   ///< the kind of `tangent`
+  /// Ggx, Beckmann: true if facets have Schlick's Fresnel term. So has Blender's node Metallic BSDF, with the Fresnel
+  /// type F82 Tint and a white Edge Tint; OSL has no such closure here.
+  bool schlick = false;
 
   Closure(ClosureKind kind_, const Rgb<T>& weight_)
       : kind(kind_),
@@ -83,7 +88,8 @@ template <class T> struct Closure {
         albedo(T(0)),
         size(0),
         smooth(1),
-        ior(1) {}
+        ior(1),
+        f0(T(0)) {}
 };
 
 /// The closures of a shader; their sum is its BSDF.
@@ -246,7 +252,11 @@ Rgb<T> evaluate(const Closure<T>& c, const Vec3<T>& wi, const Vec3<T>& wo, const
         if (c.turned) return microfacet(c.kind, c.alpha, c.normal, wi, wo);
         return microfacet(c.kind, c.alpha, c.alpha, wi, wo);
       };
-      return select(both, c.weight * of_facets(), none);
+      if (!c.schlick) return select(both, c.weight * of_facets(), none);
+      // From the sine of half the angle between the directions, whose squared distance is four times its square.
+      const Vec3<T> between = wi - wo;
+      const T sin2 = dot(between, between) / T(4), grazing = pow5(sin2 / (T(1) + sqrt(maximum(T(1) - sin2, T(0)))));
+      return select(both, c.weight * (c.f0 + (Rgb<T>(T(1)) - c.f0) * grazing) * of_facets(), none);
     }
     case ClosureKind::GlossyToon: {
       const T cosAlpha = T(2) * cosTheta_o * cosTheta_i - dot(wo, wi);

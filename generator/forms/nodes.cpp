@@ -108,6 +108,30 @@ ClosureSum<Expr> record_base(const Model& model, const ParamValues& fixed, const
   return used;
 }
 
+/// The closures of Under::record_whole(). Their sockets are outputs of the program.
+void record_whole(const Model& model, const ParamValues& fixed, Program& program, Json& closures) {
+  const Under* of = under(model);
+  if (!of || !of->record_whole) return;
+  for (const Whole<Expr>& whole : of->record_whole(model.info(), fixed)) {
+    const Closure<Expr>& c = whole.closure;
+    Json closure = {{"kind", kind_of(c.kind)}};
+    const auto output = [&](const char* socket, const auto& value) {
+      const std::string name = fmt::format("{}_{}", socket, closures.size());
+      closure[socket] = name;
+      program.output(name, value);
+    };
+    output("stands", whole.stands);
+    output("f0", c.f0);
+    // As Blender's Metallic BSDF has it: with r its squared Roughness and q = 1 - 0.9 anisotropy, alpha is r / sqrt(q)
+    // along the tangent and r sqrt(q) across it. A rotation of 0.25 is a right angle.
+    const Expr large = maximum(c.alpha, c.alpha_across), small = minimum(c.alpha, c.alpha_across);
+    output("roughness", sqrt(sqrt(large * small)));
+    output("anisotropy", (Expr(1) - small / large) * Expr(1 / (1 - kLeastAspect)));
+    output("rotation", select(c.alpha < c.alpha_across, Expr(0.25), Expr(0)));
+    closures.push_back(closure);
+  }
+}
+
 ParamValues default_choices(const ModelInfo& info) {
   ParamValues out;
   for (const ParamInfo& p : info.params)
@@ -117,12 +141,13 @@ ParamValues default_choices(const ModelInfo& info) {
 
 /// The programs that a model contributes to the parts, for one combination of choices.
 struct NodeRecording {
-  bool native = false;     ///< Blender's closures equal the whole model
-  Json closures, of_base;  ///< kinds of closures, and the names of their inputs
-  Program give;            ///< computes the inputs of `closures`
-  bool facets = false;     ///< whether the base has facets
-  Program base;            ///< computes the inputs of `of_base`
-  Program value, draw;     ///< f cos - base and pdf; a drawn direction and its weight
+  bool native = false;               ///< Blender's closures equal the whole model
+  Json closures, of_base, of_whole;  ///< kinds of closures, and the names of their inputs
+  Program give;                      ///< computes the inputs of `closures`
+  Program whole;                     ///< computes the inputs of `of_whole`
+  bool facets = false;               ///< whether the base has facets
+  Program base;                      ///< computes the inputs of `of_base`
+  Program value, draw;               ///< f cos - base and pdf; a drawn direction and its weight
 };
 
 /// Uses the current recorder; `fixed` must contain every choice.
@@ -130,7 +155,9 @@ NodeRecording record_nodes(const Model& model, const ParamValues& fixed) {
   NodeRecording out{.native = false,
                     .closures = Json::array(),
                     .of_base = Json::array(),
+                    .of_whole = Json::array(),
                     .give = {},
+                    .whole = {},
                     .base = {},
                     .value = {},
                     .draw = {}};
@@ -153,6 +180,7 @@ NodeRecording record_nodes(const Model& model, const ParamValues& fixed) {
   }
   const Vec3<Expr> wo = input3("wo"), wi = input3("wi");
   const ClosureSum<Expr> base = record_base(model, fixed, *brdf, out.base, out.of_base);
+  record_whole(model, fixed, out.whole, out.of_whole);
   out.facets = std::ranges::any_of(base, [](const Closure<Expr>& c) { return has_facets(c.kind); });
   const Rgb<Expr> f = brdf->eval(wi, wo) * abs(wi.z);
   const bool has_base = !out.of_base.empty();
@@ -198,6 +226,7 @@ std::vector<std::pair<const char*, NodeProgram>> record_parts(const Model& model
   if (!first.closures.empty()) add("closures", &NodeRecording::give);
   if (first.native) return out;
   if (!first.of_base.empty()) add("base", &NodeRecording::base);
+  if (!first.of_whole.empty()) add("whole", &NodeRecording::whole);
   const print::NodePrograms made = print::node_programs(program(&NodeRecording::value), {"wi_x", "wi_y", "wi_z"},
                                                         "kept_", node_vectors(), {"density"});
   out.push_back({"once", made.once});
@@ -361,6 +390,7 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
                     {"bounds", bounds},
                     {"closures", first.closures},
                     {"base", first.of_base},
+                    {"whole", first.of_whole},
                     {"parts", parts}};
   out.source = json_text(source) + "\n";
   return out;

@@ -7,15 +7,27 @@
 // of kinds that Blender has a node for: Diffuse, OrenNayar with the weight 1, DiffuseToon, Ggx and Beckmann, all about
 // the surface's normal. Anisotropic facets are stretched along the x axis or the view. For all choices the kinds are
 // the same; a choice may have the weight 0.
+//
+// A model that one of Blender's nodes equals for some parameters declares that as whole(), and is then that node.
 #pragma once
 
 #include <array>
+#include <vector>
 
 #include "model/base_terms.h"
 #include "model/mirror_side.h"
 #include "model/model.h"
 
 namespace brdfc::inline model {
+
+/// A closure that equals the model, with weight 1. Its facets have Schlick's Fresnel term, and its `tangent` is the x
+/// axis.
+template <class T> struct Whole {
+  T stands;  ///< 1 if it does, otherwise 0; it depends on the parameters alone
+  Closure<T> closure;
+};
+/// Blender's Metallic BSDF takes no roughness that is less than this times the other one.
+inline constexpr double kLeastAspect = 0.1;
 
 /// The base of a model.
 struct Under {
@@ -26,6 +38,9 @@ struct Under {
   /// the base, times `stands`, is less than f cos(theta_i).
   Sample<Expr> (*sample)(const ModelInfo&, const ParamValues& fixed, const Vec3<Expr>& wo, const Vec3<Expr>& u,
                          const Expr& stands);
+  /// Closures of which at most one stands, with as many entries for all choices; null where there are none.
+  std::vector<Whole<Expr>> (*record_whole)(const ModelInfo&, const ParamValues& fixed);
+  std::vector<Whole<double>> (*bound_whole)(const ModelInfo&, const ParamValues&);
 };
 /// That of the model, or a null pointer.
 const Under* under(const Model&);
@@ -93,6 +108,11 @@ concept SamplesBesideUnder = requires(const M& m, const Vec3<double>& w) {
   m.sample_beside_under(w, w, 1.0);
 };
 
+template <class M>
+concept HasWhole = requires(const M& m) {
+  m.whole();
+};
+
 template <template <class> class M> Under under_of() {
   static const auto recorded = [](const ModelInfo& info, const ParamValues& fixed) {
     const ParamValues values = complete(info, fixed);
@@ -100,19 +120,26 @@ template <template <class> class M> Under under_of() {
     m.parameters(RecordVisitor{values, fixed});
     return m;
   };
+  static const auto bound = [](const ModelInfo& info, const ParamValues& given) {
+    const ParamValues values = complete(info, given);
+    M<double> m;
+    m.parameters(BindVisitor<double>{values});
+    return m;
+  };
   Under out{[](const ModelInfo& info, const ParamValues& fixed, const Vec3<Expr>& wo) {
               return recorded(info, fixed).under(wo);
             },
             [](const ModelInfo& info, const ParamValues& given, const Vec3<double>& wo) {
-              const ParamValues values = complete(info, given);
-              M<double> m;
-              m.parameters(BindVisitor<double>{values});
-              return m.under(wo);
+              return bound(info, given).under(wo);
             },
-            nullptr};
+            nullptr, nullptr, nullptr};
   if constexpr (SamplesBesideUnder<M<double>>)
     out.sample = [](const ModelInfo& info, const ParamValues& fixed, const Vec3<Expr>& wo, const Vec3<Expr>& u,
                     const Expr& stands) { return recorded(info, fixed).sample_beside_under(wo, u, stands); };
+  if constexpr (HasWhole<M<double>>) {
+    out.record_whole = [](const ModelInfo& info, const ParamValues& fixed) { return recorded(info, fixed).whole(); };
+    out.bound_whole = [](const ModelInfo& info, const ParamValues& given) { return bound(info, given).whole(); };
+  }
   return out;
 }
 

@@ -228,6 +228,20 @@ template <class T> struct Microfacet {
     return {facets(ClosureKind::Ggx, weight(!is_beckmann()), ax, ay, T(0)),
             facets(ClosureKind::Beckmann, weight(is_beckmann()), ax, ay, T(0))};
   }
+
+  /// With a white tint F is Schlick's.
+  std::vector<Whole<T>> whole() const {
+    const T tinted = max_component(Rgb<T>(T(1)) - tint), aspect = minimum(ax, ay) / maximum(ax, ay);
+    const T stands = select(tinted <= T(0) && T(kLeastAspect) <= aspect, T(1), T(0));
+    const auto of = [&](ClosureKind kind, bool is_this) {
+      Closure<T> c = facets(kind, Rgb<T>(T(1)), ax, ay, T(0));
+      c.schlick = true;
+      c.f0 = f0;
+      const bool is_same = is_this && has_masking(SmithCorrelated) && distribution != MultiscatterGgx;
+      return Whole<T>{is_same ? stands : T(0), c};
+    };
+    return {of(ClosureKind::Ggx, !is_beckmann()), of(ClosureKind::Beckmann, is_beckmann())};
+  }
 };
 
 BRDFC_MODEL(Microfacet)

@@ -165,5 +165,48 @@ TEST(Under, IsRecordedAlikeForAllChoices) {
   }
 }
 
+/// Of microfacets, Blender's Metallic node has what Cycles' masking and a white tint make of them.
+TEST(Whole, EqualsTheModelWhereItStands) {
+  struct Row {
+    std::vector<std::string> values;
+    int stands;  ///< the entry that does, or -1
+  };
+  const std::vector<Row> rows{{{}, 0},
+                              {{"f0=0.04", "ax=0.01", "ay=0.01"}, 0},
+                              {{"f0=1,0.2,0", "ax=0.5", "ay=0.05"}, 0},
+                              {{"f0=0", "ax=0.1", "ay=1"}, 0},
+                              {{"distribution=beckmann", "f0=0.9,0.6,0.3", "ax=1e-4", "ay=1e-4"}, 1},
+                              {{"distribution=beckmann", "ax=0.3", "ay=0.8"}, 1},
+                              {{"tint=1,1,0.999"}, -1},
+                              {{"ax=0.5", "ay=0.0499"}, -1},
+                              {{"distribution=multiscatter_ggx"}, -1},
+                              {{"masking=smith_separable"}, -1},
+                              {{"distribution=beckmann", "masking=v_cavity"}, -1}};
+  const Model& m = find_model("microfacet");
+  measure::Random random(15);
+  for (const Row& row : rows) {
+    const ParamValues values = complete(m.info(), parse_values(m.info(), row.values));
+    const measure::BoundModel bound = measure::bind_model(m, values);
+    const std::vector<Whole<double>> whole = under(m)->bound_whole(m.info(), values);
+    ASSERT_EQ(whole.size(), 2u);
+    for (int i = 0; i < 2; ++i) EXPECT_EQ(whole[std::size_t(i)].stands, i == row.stands) << bound.label;
+    if (row.stands < 0) continue;
+    // Of Beckmann's Lambda Cycles has what is beyond a = 1.6013, and the model what is beyond 1.6, as 0.
+    const double within = row.stands == 0 ? 1e-7 : 1e-4;
+    for (int i = 0; i < 2000; ++i) {
+      const Vec3<double> wo = measure::uniform_direction(random);
+      const Sample<double> s =
+          bound.brdf->sample(wo, {measure::uniform(random), measure::uniform(random), measure::uniform(random)});
+      const Vec3<double> wi = i % 2 == 0 || !(s.pdf > 0) ? measure::uniform_direction(random) : s.wi;
+      const Rgb<double> f = bound.brdf->eval(wi, wo) * wi.z;
+      const Rgb<double> c = evaluate(whole[std::size_t(row.stands)].closure, wi, wo);
+      for (const auto& [a, b] : {std::pair(f.r, c.r), {f.g, c.g}, {f.b, c.b}})
+        EXPECT_NEAR(a, b, within * std::max(std::abs(a), 1e-3)) << bound.label;
+    }
+  }
+  for (const auto& [name, other] : models())
+    EXPECT_EQ(under(*other) && under(*other)->record_whole, name == "microfacet") << name;
+}
+
 }  // namespace
 }  // namespace brdfc::forms
