@@ -218,6 +218,12 @@ def _part(inputs, native, fit, color):
     )
 
 
+def _is_closure(part):
+    """Whether one of Cycles' closures equals the part's model, whatever is linked to it. Roughnesses
+    follow one socket, which does not change their ratio."""
+    return pack.model(part.model).is_closure(part.values | dict.fromkeys(part.links))
+
+
 def _errors(found):
     """Of (light, error) of each colour and roughness the errors, except where there is next to no
     light."""
@@ -325,7 +331,9 @@ def _plan_node(material, node, inputs):
         more |= {"material": material, "node": node}
         more |= {"error": max(errors), "least_error": min(errors)}
         more |= {"anisotropic": any(look["stretch"] != 1 for look in looks)}
-        more |= {"filtered": any(is_filtered(Native(**given, **look)) for look in looks)}
+        own = all(_is_closure(one) for one in (part, more.get("metal")) if one)
+        blurred = any(is_filtered(Native(**given, **look)) for look in looks)
+        more |= {"filtered": blurred and not own}
         cause = functools.cache(functools.partial(_cause, given, looks, max(errors), error_without))
         return Plan(**vars(part), **more, cause=cause)
 

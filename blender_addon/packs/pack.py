@@ -139,6 +139,16 @@ class Model:
                 return form
         return None
 
+    def is_closure(self, values):
+        """Whether one of Cycles' closures equals the model at these values; None stands for one that
+        is linked. Formula Nodes and the aimed form are then that closure."""
+        from ..brdfc import model as formulas
+
+        try:
+            return formulas(self.name).is_closure(values | self.fixed)
+        except ValueError:  # a value that scripts set outside of its range
+            return False
+
     def automatic(self, values=None, osl=True):
         """The Form that "auto" takes with or without OSL: the model's preferred one, or the next if
         that does not support `values`."""

@@ -72,8 +72,8 @@ template <class T> struct Closure {
   Rgb<T> f0;                           ///< if `schlick`: reflectance of a facet seen from above, from 0 to 1
   bool turned = false;                 ///< true if `normal` is not the surface's; it must not point below the surface
   Tangent stretched = Tangent::None;   ///< the kind of `tangent`
-  /// Ggx, Beckmann: true if facets have Schlick's Fresnel term. So has Blender's node Metallic BSDF, with the Fresnel
-  /// type F82 Tint and a white Edge Tint; OSL has no such closure here.
+  /// Ggx, Beckmann: true if facets have Schlick's Fresnel term: generalized_schlick_bsdf(), and Blender's Metallic BSDF
+  /// with the Fresnel type F82 Tint and a white Edge Tint.
   bool schlick = false;
 
   Closure(ClosureKind kind_, const Rgb<T>& weight_)

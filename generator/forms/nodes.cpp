@@ -110,9 +110,8 @@ ClosureSum<Expr> record_base(const Model& model, const ParamValues& fixed, const
 
 /// The closures of Under::record_whole(). Their sockets are outputs of the program.
 void record_whole(const Model& model, const ParamValues& fixed, Program& program, Json& closures) {
-  const Under* of = under(model);
-  if (!of || !of->record_whole) return;
-  for (const Whole<Expr>& whole : of->record_whole(model.info(), fixed)) {
+  if (!has_whole(model)) return;
+  for (const Whole<Expr>& whole : under(model)->record_whole(model.info(), fixed)) {
     const Closure<Expr>& c = whole.closure;
     Json closure = {{"kind", kind_of(c.kind)}};
     const auto output = [&](const char* socket, const auto& value) {

@@ -22,6 +22,13 @@ struct ShaderBody {
   SharedArrays arrays = {};
   print::Statements statements = {};     ///< between the frame's declarations and the assignment of BSDF
   std::vector<print::Value> terms = {};  ///< the closures whose sum is BSDF
+  /// A closure that is all of BSDF where the variable is not 0; the statements above are left out then.
+  struct Whole {
+    std::string stands;
+    print::Value closure;
+  };
+  std::vector<Whole> wholes = {};
+  print::Statements of_wholes = {};  ///< assigns the variables of `wholes`
 
   /// Records once for each combination of choices that the fixed values allow; the callback gets the combination
   /// together with the fixed values. Returns the closures, which must be the same for all combinations that have any,

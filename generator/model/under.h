@@ -8,7 +8,8 @@
 // the surface's normal. Anisotropic facets are stretched along the x axis or the view. For all choices the kinds are
 // the same; a choice may have the weight 0.
 //
-// A model that one of Blender's nodes equals for some parameters declares that as whole(), and is then that node.
+// A model that one of Cycles' closures equals for some parameters declares that as whole(), and is then that closure,
+// in the form of nodes and in the aimed form.
 #pragma once
 
 #include <array>
@@ -44,6 +45,8 @@ struct Under {
 };
 /// That of the model, or a null pointer.
 const Under* under(const Model&);
+/// Whether the model has closures that equal it for some parameters.
+inline bool has_whole(const Model& model) { return under(model) && under(model)->record_whole; }
 /// Called by BRDFC_UNDER before main().
 bool register_under(const std::string& name, const Under&);
 

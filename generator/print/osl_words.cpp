@@ -19,8 +19,8 @@ constexpr const char* kOslWords = R"(
 
   Ci I N Ng Oi P Ps dPdtime dPdu dPdv dtime time u v
 
-  abs atan backfacing burley_diffuse_bsdf cbrt clamp cos diffuse_ramp dot emission exp getattribute glossy_toon isfinite log max
-  microfacet min normalize oren_nayar_diffuse_bsdf phong_ramp pow raytype reflect reflection refraction sin sqrt
+  abs atan backfacing burley_diffuse_bsdf cbrt clamp cos diffuse_ramp dot emission exp generalized_schlick_bsdf getattribute glossy_toon
+  isfinite log max microfacet min normalize oren_nayar_diffuse_bsdf phong_ramp pow raytype reflect reflection refraction sin sqrt
 
   area ceil cross distance floor hypot length mix mod noise rotate round sign smoothstep step transform
 
@@ -45,7 +45,7 @@ constexpr const char* kOslWords = R"(
 /// Prefixes of numbered names.
 constexpr const char* kNumbered =
     "albedo alpha alpha_across exponent ior knots normal position ramp roughness size smooth table table_b table_g "
-    "table_r tangent u v weight";
+    "table_r tangent u v weight whole_across whole_alpha whole_f0 whole_stands";
 
 std::set<std::string> split(const char* text) {
   std::istringstream in(text);

@@ -205,7 +205,7 @@ TEST(Whole, EqualsTheModelWhereItStands) {
     }
   }
   for (const auto& [name, other] : models())
-    EXPECT_EQ(under(*other) && under(*other)->record_whole, name == "microfacet") << name;
+    EXPECT_EQ(has_whole(*other), name == "microfacet") << name;
 }
 
 }  // namespace
