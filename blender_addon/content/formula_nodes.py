@@ -198,7 +198,7 @@ def _wired(w, data, normal, tangent, parameters, of_slots, cones, title):
         given |= {"stands": w.math("LESS_THAN", bent, 1e-4)}
         given |= parts.add("base", **given)
         shaders += [_of_base(w, closure, given, surface) for closure in data["base"]]
-    lamps = []
+    lamps, others = [], []
     # All closures of a shading point are sampled with the same numbers: they are added up, so they
     # need not be independent.
     given |= {f"u_{i}": number for i, number in enumerate(surface.drawn)}
@@ -210,28 +210,21 @@ def _wired(w, data, normal, tangent, parameters, of_slots, cones, title):
         here |= dict(frame)
         given |= here | constants
         lamps = formula_lamps.seen(w, parts, of_slots, cones, here, data["widest"])
-    shaders.append(_rest(w, parts, surface, given, lamps, data["narrow"]))
-    shaders += formula_lamps.closures(w, parts, lamps, cones, given)
-    total = w.sum(shaders)
+    others.append(_rest(w, parts, surface, given, lamps, data["narrow"]))
+    others += formula_lamps.closures(w, parts, lamps, cones, given)
     if parts.has("whole"):
-        found = parts.add("whole", **parameters)
-        for closure in data["whole"]:
-            total = _whole(w, closure, found, surface, total)
-    return {"BSDF": total}
-
-
-def _whole(w, closure, found, surface, otherwise):
-    """A closure of Blender's that equals the model, where it does."""
-    of = {name: found[value] for name, value in closure.items() if name != "kind"}
-    stands = of.pop("stands")
-    # Cycles bends its normal itself.
-    metal = w.metal(closure["kind"], **of, normal=surface.unbent, tangent=surface.tangent)
-    return w.shown(stands, metal, otherwise)
+        others = [w.shown(parts.add("whole", **parameters)["others"], w.sum(others))]
+    return {"BSDF": w.sum(shaders + others)}
 
 
 def _of_base(w, closure, given, surface):
     """A closure of the base."""
     found = {name: given[of] for name, of in closure.items() if name not in ("kind", "along")}
+    stands = found.pop("stands", None)
+    if "f0" in found:
+        # Cycles bends the normal itself.
+        metal = w.metal(closure["kind"], **found, normal=surface.unbent, tangent=surface.tangent)
+        return w.shown(stands, metal)
     if closure["kind"] == "cone":
         return w.toon(found["weight"], found["size"], surface.normal, found["smooth"], "DIFFUSE")
     tangent = surface.tangent
@@ -240,7 +233,8 @@ def _of_base(w, closure, given, surface):
         tangent = w.vector("ADD", surface.view, w.scaled(tangent, 1e-3))
     stretched = (found["anisotropy"], tangent) if "anisotropy" in found else None
     roughness = found.get("roughness", 0.0)
-    return w.bsdf(closure["kind"], found["weight"], surface.normal, roughness, stretched)
+    bsdf = w.bsdf(closure["kind"], found["weight"], surface.normal, roughness, stretched)
+    return bsdf if stands is None else w.shown(stands, bsdf)
 
 
 def _rest(w, parts, surface, given, lamps, narrow):

@@ -88,13 +88,12 @@ class Wiring:
             self.give(node.inputs["Tangent"], stretched[1])
         return node.outputs["BSDF"]
 
-    def metal(self, kind, f0, roughness, anisotropy, rotation, normal, tangent):
-        """Facets whose Fresnel term is Schlick's."""
+    def metal(self, kind, f0, edge, roughness, anisotropy, rotation, normal, tangent):
         node = self.node(
             "ShaderNodeBsdfMetallic", fresnel_type="F82", distribution=DISTRIBUTIONS[kind]
         )
         self.give(node.inputs["Base Color"], f0)
-        self.give(node.inputs["Edge Tint"], (1.0, 1.0, 1.0, 1.0))
+        self.give(node.inputs["Edge Tint"], edge)
         self.give(node.inputs["Roughness"], roughness)
         self.give(node.inputs["Anisotropy"], anisotropy)
         self.give(node.inputs["Rotation"], rotation)
@@ -163,12 +162,9 @@ class Wiring:
         self.give(node.inputs["Normal"], normal)
         return node.outputs[0]
 
-    def shown(self, factor, shader, otherwise=None):
-        """A shader times a factor, and another one times the rest to 1. Where the factor is 0 or 1,
-        Cycles skips the inputs of the shader that is not shown."""
+    def shown(self, factor, shader):
+        """A shader times a factor; where the factor is 0, Cycles skips the shader's inputs."""
         node = self.node("ShaderNodeMixShader")
         self.give(node.inputs[0], factor)
-        if otherwise is not None:
-            self.give(node.inputs[1], otherwise)
         self.give(node.inputs[2], shader)
         return node.outputs[0]

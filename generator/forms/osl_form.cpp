@@ -284,9 +284,8 @@ Shader OslForm::write(const Model& model, const measure::AlbedoTable& table, con
     input_error("{}: the {} form needs {} closure slots, and Cycles keeps {}", info.name, name(), shader.slots,
                 kMaxClosures);
   sum.push_back(assign("BSDF", print::balanced_sum(made.terms)));
-  append(body, made.of_wholes);
-  for (const ShaderBody::Whole& whole : made.wholes)
-    sum = {print::If{operation(whole.stands, "!=", 0.0), {assign("BSDF", whole.closure)}, sum}};
+  append(body, made.of_whole);
+  if (made.whole) sum = {print::If{operation("whole", "!=", 0.0), {assign("BSDF", *made.whole)}, sum}};
   append(body, sum);
   add(print::Gap{});
   Statements of_albedo;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -22,13 +23,9 @@ struct ShaderBody {
   SharedArrays arrays = {};
   print::Statements statements = {};     ///< between the frame's declarations and the assignment of BSDF
   std::vector<print::Value> terms = {};  ///< the closures whose sum is BSDF
-  /// A closure that is all of BSDF where the variable is not 0; the statements above are left out then.
-  struct Whole {
-    std::string stands;
-    print::Value closure;
-  };
-  std::vector<Whole> wholes = {};
-  print::Statements of_wholes = {};  ///< assigns the variables of `wholes`
+  /// What BSDF is where the variable `whole` is not 0; the statements above are left out then.
+  std::optional<print::Value> whole = {};
+  print::Statements of_whole = {};  ///< assigns the variables of `whole`
 
   /// Records once for each combination of choices that the fixed values allow; the callback gets the combination
   /// together with the fixed values. Returns the closures, which must be the same for all combinations that have any,

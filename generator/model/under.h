@@ -4,16 +4,15 @@
 //
 // A model declares them as under(wo), and registers that with BRDFC_UNDER after BRDFC_MODEL. For any parameters and
 // directions their sum is at most f cos(theta_i), but for 2e-4 of the model's light; weights are not negative. They are
-// of kinds that Blender has a node for: Diffuse, OrenNayar with the weight 1, DiffuseToon, Ggx and Beckmann, all about
-// the surface's normal. Anisotropic facets are stretched along the x axis or the view. For all choices the kinds are
-// the same; a choice may have the weight 0.
+// of kinds that Blender has a node for: Diffuse, OrenNayar with the weight 1, DiffuseToon, Ggx and Beckmann, also as
+// metal with a grey weight of 0 or 1, all about the surface's normal. Anisotropic facets are stretched along the x axis
+// or the view. For all choices the kinds are the same; a choice may have the weight 0.
 //
-// A model that one of Cycles' closures equals for some parameters declares that as whole(), and is then that closure,
-// in the form of nodes and in the aimed form.
+// A model that these closures equal for some parameters says so by whole(), and is then made of them alone, in the form
+// of nodes and in the aimed form.
 #pragma once
 
 #include <array>
-#include <vector>
 
 #include "model/base_terms.h"
 #include "model/mirror_side.h"
@@ -21,12 +20,6 @@
 
 namespace brdfc::inline model {
 
-/// A closure that equals the model, with weight 1. Its facets have Schlick's Fresnel term, and its `tangent` is the x
-/// axis.
-template <class T> struct Whole {
-  T stands;  ///< 1 if it does, otherwise 0; it depends on the parameters alone
-  Closure<T> closure;
-};
 /// Blender's Metallic BSDF takes no roughness that is less than this times the other one.
 inline constexpr double kLeastAspect = 0.1;
 
@@ -39,13 +32,13 @@ struct Under {
   /// the base, times `stands`, is less than f cos(theta_i).
   Sample<Expr> (*sample)(const ModelInfo&, const ParamValues& fixed, const Vec3<Expr>& wo, const Vec3<Expr>& u,
                          const Expr& stands);
-  /// Closures of which at most one stands, with as many entries for all choices; null where there are none.
-  std::vector<Whole<Expr>> (*record_whole)(const ModelInfo&, const ParamValues& fixed);
-  std::vector<Whole<double>> (*bound_whole)(const ModelInfo&, const ParamValues&);
+  /// 1 where the base is all of the model, otherwise 0: it depends on the parameters alone. Null where it never is.
+  Expr (*record_whole)(const ModelInfo&, const ParamValues& fixed);
+  double (*bound_whole)(const ModelInfo&, const ParamValues&);
 };
 /// That of the model, or a null pointer.
 const Under* under(const Model&);
-/// Whether the model has closures that equal it for some parameters.
+/// Whether the model's base is all of it for some parameters.
 inline bool has_whole(const Model& model) { return under(model) && under(model)->record_whole; }
 /// Called by BRDFC_UNDER before main().
 bool register_under(const std::string& name, const Under&);

@@ -221,26 +221,40 @@ template <class T> struct Microfacet {
             facets(ClosureKind::Beckmann, is_beckmann() ? weight : none, ax, ay, T(0))};
   }
 
-  /// Cycles' closures, if the masking is theirs, with the least F: S is at least f0, and q at most 1.
+  /// Cycles' closures, if the masking is theirs.
+  ///
+  /// Metal has the F of Kutz and others. With b = S(1/7) it is S - (1 - tint) b q, which is not above this F,
+  /// S - (1 - tint) S q, as long as S is at most b: where facets are seen at 82 degrees or less. Light comes from
+  /// within 90 degrees of the normal, so all facets are, seen from a cosine of kSteep or more. From below, the tint of
+  /// the metal is 1 - (1 - tint) / b, which makes it darker than this F for S up to 1. Interreflection, and facets that
+  /// the closure can't stretch so far, are added or replaced with the least F: S is at least f0, and q at most 1.
   ClosureSum<T> under(const Vec3<T>& wo) const {
-    const Rgb<T> least = f0 * tint * compensation(wo), none(T(0));
-    const auto weight = [&](bool is_this) { return is_this && has_masking(SmithCorrelated) ? least : none; };
-    return {facets(ClosureKind::Ggx, weight(!is_beckmann()), ax, ay, T(0)),
-            facets(ClosureKind::Beckmann, weight(is_beckmann()), ax, ay, T(0))};
+    constexpr double kSteep = 0.2829;  // cos(2 acos(1/7) - 90 degrees)
+    const Rgb<T> one(T(1)), none(T(0)), compensated = compensation(wo), least = f0 * tint;
+    const bool smith = has_masking(SmithCorrelated);
+    // Without a tint Cycles, which multiplies the two conditions, does not have to compare the view.
+    const auto grazing = wo.z < T(kSteep) && T(0) < max_component(one - tint);
+    const Rgb<T> edge = select(grazing, one - (one - tint) / fresnel_at_82(f0), tint);
+    const T is_metal = select(T(kLeastAspect) <= aspect() && max_component(one - edge) <= T(1), T(1), T(0));
+    const auto metal = [&](ClosureKind kind, bool is_this) {
+      Closure<T> c = facets(kind, smith && is_this ? Rgb<T>(is_metal) : none, ax, ay, T(0));
+      c.metal = true;
+      c.f0 = f0;
+      c.edge = edge;
+      return c;
+    };
+    const auto rest = [&](ClosureKind kind, bool is_this) {
+      return facets(kind, smith && is_this ? least * (compensated - Rgb<T>(is_metal)) : none, ax, ay, T(0));
+    };
+    return {metal(ClosureKind::Ggx, !is_beckmann()), metal(ClosureKind::Beckmann, is_beckmann()),
+            rest(ClosureKind::Ggx, !is_beckmann()), rest(ClosureKind::Beckmann, is_beckmann())};
   }
+  T aspect() const { return minimum(ax, ay) / maximum(ax, ay); }
 
   /// With a white tint F is Schlick's.
-  std::vector<Whole<T>> whole() const {
-    const T tinted = max_component(Rgb<T>(T(1)) - tint), aspect = minimum(ax, ay) / maximum(ax, ay);
-    const T stands = select(tinted <= T(0) && T(kLeastAspect) <= aspect, T(1), T(0));
-    const auto of = [&](ClosureKind kind, bool is_this) {
-      Closure<T> c = facets(kind, Rgb<T>(T(1)), ax, ay, T(0));
-      c.schlick = true;
-      c.f0 = f0;
-      const bool is_same = is_this && has_masking(SmithCorrelated) && distribution != MultiscatterGgx;
-      return Whole<T>{is_same ? stands : T(0), c};
-    };
-    return {of(ClosureKind::Ggx, !is_beckmann()), of(ClosureKind::Beckmann, is_beckmann())};
+  T whole() const {
+    if (!has_masking(SmithCorrelated) || distribution == MultiscatterGgx) return T(0);
+    return select(max_component(Rgb<T>(T(1)) - tint) <= T(0) && T(kLeastAspect) <= aspect(), T(1), T(0));
   }
 };
 

@@ -28,9 +28,7 @@ RecordedModel record_model(const Model& model, const Choices& choices, Precision
   Rgb<Expr> transmittance;
   if (model.has_medium()) transmittance = brdf->transmittance(Expr::input("distance"));
   Expr stands(0);
-  if (has_whole(model))
-    for (const Whole<Expr>& whole : under(model)->record_whole(model.info(), with_choices(model.info(), choices)))
-      stands = stands + whole.stands;
+  if (has_whole(model)) stands = under(model)->record_whole(model.info(), with_choices(model.info(), choices));
   RecordedModel out;
   if (model.has_scatter()) {
     out.eval.output("f", f);

@@ -27,7 +27,7 @@ constexpr const char* kOslWords = R"(
   Albedo BSDF Normal Shown Tangent
 
   entry first frame_b frame_n frame_t last mirror_rise mirror_weight path_length ray shading_n show side
-  shown_f shown_pdf shown_weight shown_x shown_y shown_z sum u_all weight wi wi_x wi_y wi_z wo wo_x wo_y wo_z
+  shown_f shown_pdf shown_weight shown_x shown_y shown_z sum u_all weight whole wi wi_x wi_y wi_z wo wo_x wo_y wo_z
 
   across_here aimed along_here any_beam any_flat any_spot beam beam_blend beam_edge beam_here centre_here chosen
   chosen_extent chosen_towards covered covered_before density_under disk_here drawn_density drawn_x drawn_y drawn_z
