@@ -114,8 +114,9 @@ template <class T> struct RoughGlass {
     const Vec3<T> bent = across * (select(across.z < T(0), T(-1), T(1)) / maximum(length(across), tiny<T>()));
     const T oh = dot(v.o, bent), ih = dot(i, bent);
     const auto refracts = i.z < T(0) && oh > T(0) && ih < T(0);
-    const T s = maximum(oh, tiny<T>()), mirrored = reflecting(k.oh, k.one_minus_oh * (T(1) + k.oh), v);
-    const T passed = refracting(s, v.n * maximum(-ih, T(0)), v);
+    // Where there is no such facet, numbers for which no derivative is infinite.
+    const T s = select(refracts, oh, T(1)), g = select(refracts, -v.n * ih, T(1));
+    const T mirrored = reflecting(k.oh, k.one_minus_oh * (T(1) + k.oh), v), passed = refracting(s, g, v);
     return {{i.x, i.y, abs(i.z)},
             select(reflects, k.h, bent),
             select(reflects, k.oh, s),
