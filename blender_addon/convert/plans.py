@@ -57,7 +57,7 @@ def _plan_glass(material, node, inputs):
     inputs.setting("mute")
     inputs.check_unknown(KNOWN_SOCKETS["glass"])
     if inputs.value("Roughness") > 1e-3:
-        raise Refused(say("no model is of rough glass"))
+        raise Refused(say("the model of rough glass is darker under lamps"))
     if inputs.value("Thin Film Thickness") != 0:
         raise Refused(say("it has {what}", what=Sentence("Thin Film")))
     # Blender's glass tints both reflected and transmitted light.
@@ -80,7 +80,7 @@ def _plan_clear(material, node, inputs):
     inputs.check_unknown(KNOWN_SOCKETS["principled"])
     check_off(inputs, but={"Transmission Weight"})
     if inputs.value("Roughness") > 1e-3:
-        raise Refused(say("no model is of rough glass"))
+        raise Refused(say("the model of rough glass is darker under lamps"))
     if inputs.value("Specular IOR Level") != 0.5:
         raise Refused(say("it has {what}", what=Sentence("Specular IOR Level")))
     if inputs.value("Specular Tint", (1.0, 1.0, 1.0)) != (1, 1, 1):

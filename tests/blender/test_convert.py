@@ -878,7 +878,7 @@ REFUSED = [
     ("principled", {"Coat_Weight": 0.5}, "it has Coat"),
     ("principled", {"Transmission_Weight": 0.9}, "it has Transmission"),
     ("principled", {"Transmission_Weight": 1.0, "Metallic": 0.5}, "it has Transmission"),
-    ("principled", {"Transmission_Weight": 1.0}, "no model is of rough glass"),
+    ("principled", {"Transmission_Weight": 1.0}, "the model of rough glass is darker under lamps"),
     (
         "principled",
         {"Transmission_Weight": 1.0, "Roughness": 0.0, "Specular_IOR_Level": 0.4},
@@ -890,7 +890,7 @@ REFUSED = [
         "it has Coat",
     ),
     ("principled", {"Subsurface_Weight": 0.2}, "it has Subsurface"),
-    ("glass", {"Roughness": 0.3}, "no model is of rough glass"),
+    ("glass", {"Roughness": 0.3}, "the model of rough glass is darker under lamps"),
     ("glass", {"Color": (2.0, 1.0, 1.0)}, "Tint of Fresnel Dielectric would be 2, and may be 0 to"),
     # Values outside the range of a model, or of what Blender's formulas are taken for.
     ("glass", {"IOR": 0.0}, "IOR of Fresnel Dielectric would be 0, and may be 0.1 to 10"),
