@@ -79,7 +79,9 @@ class Problem {
     Colors f;
     double best = std::numeric_limits<double>::infinity();
     std::vector<Rgb<double>> best_found = found;
-    for (int round = 0; round < (n ? 3 : 1); ++round) {
+    // Colours that f is far from linear in, as Hapke's, take further rounds, of which each must pay.
+    bool pays = false;
+    for (int round = 0; round < (n ? 3 : 1) || (pays && round < 12); ++round) {
       for (std::size_t j = 0; j < n; ++j) set(*colors_[j], round == 0 ? Rgb<double>(0) : found[j]);
       const std::vector<Rgb<double>> base = round == 0 ? std::vector<Rgb<double>>(n, Rgb<double>(0)) : found;
       const Colors at_base = eval(p);
@@ -119,13 +121,27 @@ class Problem {
                       channel(p.data[k], c) - target[Eigen::Index(k)] +
                           columns.row(Eigen::Index(k)).head(Eigen::Index(n)).dot(x.head(Eigen::Index(n))));
       }
-      for (std::size_t j = 0; j < n; ++j) set(*colors_[j], found[j]);
-      f = eval(p);
+      const auto try_found = [&] {
+        for (std::size_t j = 0; j < n; ++j) set(*colors_[j], found[j]);
+        f = eval(p);
+      };
+      const auto error_of_found = [&] {
+        Colors with_matte = f;
+        if (matte)
+          for (Rgb<double>& v : with_matte) v += added / kPi;
+        return error_of(p, with_matte);
+      };
+      try_found();
       // As it is in most: another round would find the same colours.
       const bool settled = !differ(f, linear, 1e-9);
-      if (matte)
-        for (Rgb<double>& v : f) v += added / kPi;
-      const double error = error_of(p, f);
+      double error = error_of_found();
+      // Where f is curved, a step may go too far.
+      for (int i = 0; i < 4 && n > 0 && error > 1.1 * best; ++i) {
+        for (std::size_t j = 0; j < n; ++j) found[j] = (found[j] + best_found[j]) * 0.5;
+        try_found();
+        error = error_of_found();
+      }
+      pays = error < 0.9 * best;
       if (!(error < best * (1 - 1e-6))) break;
       best = error;
       best_found = found;

@@ -196,7 +196,7 @@ def test_shaders_are_short(extension_zip, subtests):
     operations and here in its text. Aimed forms contain a base and the computations for lamps in
     addition to a model's value and sampling: up to 1,400 statements, which compile in about 0.4 s;
     `lossless`, whose value is a long sum, has 2,900; `factors`, with three curves, has 2,300, and
-    900 without a base and lamps."""
+    900 without a base and lamps; the fit of `hapke` has 800."""
     import zipfile
 
     text = "shader x(float a = 0 [[ int b = 1; ]],\n    output color Albedo = 0)\n{\n"
@@ -215,7 +215,10 @@ def test_shaders_are_short(extension_zip, subtests):
             with subtests.test(name):
                 found = statements(archive.read(name).decode())
                 print(f"{name}: {operations} operations, {found} statements")
-                longer = {"lossless_aimed": 2900, "factors_aimed": 2300, "factors_sampled": 900}
+                longer = {
+                    **{"lossless_aimed": 2900, "factors_aimed": 2300, "factors_sampled": 900},
+                    "hapke_fitted": 800,
+                }
                 most = next((m for part, m in longer.items() if part in name), None)
                 most = most or (1450 if "_aimed" in name else 600)
                 assert operations < most

@@ -225,6 +225,7 @@ const Found kFound[] = {
     {"cook_torrance", {{"m", 0.45}}, {"f0", "m"}},
     {"glossy_reflector", {{"e", 30.}}, {"e"}},
     {"glossy_specular", {{"e", 30.}}, {"e"}},
+    {"hapke", {{"b", 0.45}, {"h", 0.2}}, {"w", "b"}},
     {"lafortune", {}, {"ks", "e", "cxy", "cz"}},
     {"lambert", {}, {"rho"}},
     {"lossless", {{"n", 7.}}, {"tint", "n"}},

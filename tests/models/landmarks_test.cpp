@@ -2,6 +2,7 @@
 // What the papers state about these models in words or pictures, as numbers; including the flaws.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "core/sequence.h"
@@ -177,6 +178,73 @@ TEST(Coupled, Eq6IsInvertedToMachinePrecision) {
     worst = std::max(worst, double(std::abs((F - xi) / (slope * c))));  // relative error of c
   }
   EXPECT_LT(worst, 4 * 0x1p-52);
+}
+
+/// Chandrasekhar's H by its equation 1 / H(x) = sqrt(1 - w) + w / 2 int_0^1 y H(y) / (x + y) dy, for isotropic
+/// scattering (Radiative Transfer, 1950, sec. 38). Midpoints of y = t^3, since H is steep at 0.
+class Chandrasekhar {
+ public:
+  explicit Chandrasekhar(double w) : w_(w) {
+    for (int i = 0; i < kNodes; ++i) y_[i] = std::pow((i + 0.5) / kNodes, 3), h_[i] = 1;
+    for (int step = 0; step < 500; ++step) {
+      std::array<double, kNodes> next;
+      for (int i = 0; i < kNodes; ++i) next[i] = (*this)(y_[i]);
+      for (int i = 0; i < kNodes; ++i) h_[i] = (h_[i] + next[i]) / 2;
+    }
+  }
+  double operator()(double x) const {
+    double sum = 0;
+    for (int i = 0; i < kNodes; ++i) {
+      const double t = (i + 0.5) / kNodes;
+      sum += 3 * t * t / kNodes * y_[i] * h_[i] / (x + y_[i]);
+    }
+    return 1 / (std::sqrt(1 - w_) + w_ / 2 * sum);
+  }
+
+ private:
+  static constexpr int kNodes = 200;
+  double w_;
+  std::array<double, kNodes> y_, h_;
+};
+
+TEST(Hapke, WithoutSurgeAndMultipleScatteringIsLommelAndSeeligersLaw) {
+  const measure::BoundModel b = bound("hapke", {"w=0.6", "b=0", "b0=0", "scattering=single"});
+  for (const double c : {1., 0.5, 0.1, 0.01}) {
+    expect_albedo(b, c, 0.3 * (1 - c * std::log(1 + 1 / c)));
+    for (const double i : {1., 0.3, 0.02})
+      EXPECT_NEAR(b.brdf->eval(direction(i, 0.3), direction(c, 2)).g, 0.6 / (4 * kPi) / (i + c), 1e-12);
+  }
+}
+
+TEST(Hapke, ApproximatesChandrasekharsFunctionFromBelow) {
+  // Chandrasekhar's table XI.
+  const Chandrasekhar conservative(1);
+  for (const auto& [x, h] : {std::pair{0.1, 1.24735}, {0.2, 1.45035}, {0.5, 2.01278}, {1.0, 2.90781}})
+    EXPECT_NEAR(conservative(x), h, 4e-5 * h) << x;
+  double worst = 0;
+  for (const double w : {0.1, 0.5, 0.9, 0.99, 1.0}) {
+    const Chandrasekhar H(w);
+    const std::string colour = fmt::format("w={}", w);
+    const measure::BoundModel all = bound("hapke", {colour, "b=0", "b0=0"}),
+                              once = bound("hapke", {colour, "b=0", "b0=0", "scattering=single"});
+    for (const double x : {0.01, 0.1, 0.3, 0.6, 1.0}) {
+      const Vec3<double> wi = direction(x, 0.3), wo = direction(x, 2);
+      const double again = all.brdf->eval(wi, wo).g / once.brdf->eval(wi, wo).g - 1;  // H^2 - 1
+      const double below = 1 - std::sqrt(1 + again) / H(x);
+      EXPECT_GT(below, -1e-4) << all.label << " x=" << x;
+      worst = std::max(worst, below);
+      // With the true H the albedo is 1 - sqrt(1 - w) H.
+      const double lost = 1 - albedo_at(all, x) / (1 - std::sqrt(1 - w) * H(x));
+      EXPECT_GT(lost, -1e-4) << all.label << " x=" << x;
+      EXPECT_LT(lost, 0.02) << all.label << " x=" << x;
+      if (w == 1) {
+        EXPECT_GT(lost, 0.005) << x;
+        EXPECT_LT(lost, 0.0145) << x;
+      }
+    }
+  }
+  EXPECT_GT(worst, 0.008);
+  EXPECT_LT(worst, 0.0098);
 }
 
 }  // namespace

@@ -1317,6 +1317,63 @@ def charlie_albedo(p, cos_o):
     return [c * total for c in p["tint"]]
 
 
+# ---- Hapke: 1981, with H of 2002 and the two lobes of the book's second edition -----------------
+
+
+def hapke_henyey_greenstein(b, x):
+    return (1 - b * b) / (1 - 2 * b * x + b * b) ** 1.5
+
+
+def hapke_h(w, x, lib):
+    y = lib.sqrt(1 - w)
+    r0 = (1 - y) / (1 + y)
+    return 1 / (1 - w * x * (r0 + (1 - 2 * r0 * x) / 2 * lib.log((1 + x) / x)))
+
+
+def hapke_value(p, w, ci, co, cos_g, lib):
+    b, c, b0, h = (p[k] for k in ("b", "c", "b0", "h"))
+    back, on = hapke_henyey_greenstein(b, cos_g), hapke_henyey_greenstein(b, -cos_g)
+    surge = b0 / (1 + lib.sqrt((1 - cos_g) / (1 + cos_g)) / h)
+    scattered = (1 + surge) * ((1 + c) / 2 * back + (1 - c) / 2 * on)
+    if p["scattering"] == "multiple":
+        scattered += hapke_h(w, ci, lib) * hapke_h(w, co, lib) - 1
+    return w / (4 * lib.pi) * scattered / (ci + co)
+
+
+def hapke_f(p, wi, wo):
+    k1, k2 = vec(wi), vec(wo)
+    p = {k: mp.mpf(v) if isinstance(v, (int, float)) else v for k, v in p.items()}
+    return [hapke_value(p, mp.mpf(w), k1[2], k2[2], dot(k1, k2), mp) for w in p["w"]]
+
+
+def hapke_pdf(p, wi, wo):
+    """Lobes about both directions of the view's line, folded at the horizon, and a density between
+    uniform and cosine."""
+    k1, k2 = vec(wi), vec(wo)
+    b, c = mp.mpf(p["b"]), mp.mpf(p["c"])
+    low = 1 - k2[2]
+    back, on = b * (1 + c) * 2 / 5, b * (1 - c) * 2 / 5 * low**4
+    lobes = 0
+    for x in (dot(k1, k2), dot([k1[0], k1[1], -k1[2]], k2)):
+        lobes += back * hapke_henyey_greenstein(b, x) + on * hapke_henyey_greenstein(b, -x)
+    level = mp.mpf("0.05") + mp.mpf("0.7") * low**3
+    rest = (level + 2 * (1 - level) * k1[2]) / (2 * mp.pi)
+    return lobes / (4 * mp.pi) + (1 - back - on) * rest
+
+
+def hapke_albedo(p, cos_o):
+    """The surge has a cusp where the light is at the viewer."""
+    nodes, weights = ends()
+    so, total = math.sqrt(1 - cos_o**2), [0.0] * 3
+    for low, high in itertools.pairwise(sorted({0, cos_o, 1})):
+        x = (low + (high - low) * nodes)[:, None]
+        cos_g = np.minimum(np.sqrt(1 - x * x) * so * np.cos(math.pi * nodes) + x * cos_o, 1)
+        for i, w in enumerate(p["w"]):
+            f = hapke_value(p, w, x, cos_o, cos_g, np)
+            total[i] += (high - low) * 2 * math.pi * float(weights @ (x * f) @ weights)
+    return total
+
+
 # ---- EON: Portsmouth, Kutz and Hill, 2025 ------------------------------------------------------
 
 
@@ -1866,6 +1923,26 @@ MODELS = {
             {"r": 0.1, "terminator": "soft"},
         ],
         cosines=[1, 0.5, 0.1],
+    ),
+    "hapke": dict(
+        f=hapke_f,
+        pdf=hapke_pdf,
+        albedo=hapke_albedo,
+        defaults={
+            "w": (0.8, 0.8, 0.8),
+            "b": 0.3,
+            "c": 0.4,
+            "b0": 0.8,
+            "h": 0.06,
+            "scattering": "multiple",
+        },
+        cases=[
+            {},
+            {"b": 0, "b0": 0, "scattering": "single"},
+            {"w": (1, 0.5, 1e-6), "b": 0.7, "c": -0.6, "b0": 0},
+            {"w": (0.3, 0.2, 0.1), "b": 0.5, "c": 1, "b0": 2, "h": 0.5, "scattering": "single"},
+        ],
+        cosines=[1, 0.5, 0.1, 0.01],
     ),
     "eon": dict(
         f=eon_f,

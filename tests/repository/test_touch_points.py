@@ -2,6 +2,7 @@
 """A new model needs one file, one row of test cases and one row in the docs; everything else that
 lists models is made by a script or the build."""
 
+import json
 import re
 import subprocess
 
@@ -33,6 +34,12 @@ GENERATED_OF_SCATTERING = {
     "docs/noise.csv": "{},",
     "docs/noise-cost.csv": "{},",
 }
+#: Sentences that say how many models or materials there are.
+COUNTS = {
+    "README.md": ("adds new ones: {models} published models",),
+    "CHANGELOG.md": ("each of {models} reflection models", "A library of {materials} materials"),
+    "docs/library.md": ("The extension has {materials} ready-made materials",),
+}
 #: A file that names at least this fraction of all models counts as a list of models.
 MOST = 0.8
 
@@ -40,6 +47,16 @@ MOST = 0.8
 def rows_missing(file, start, names):
     lines = (ROOT / file).read_text(encoding="utf-8")
     return [n for n in names if not re.search(f"(?m)^{re.escape(start.format(n))}", lines)]
+
+
+@pytest.mark.parametrize("file", COUNTS)
+def test_counts_are_right(file):
+    library = ROOT / "blender_addon" / "library" / "materials.json"
+    catalogs = json.loads(library.read_text(encoding="utf-8"))
+    materials = sum(len(entries) for entries in catalogs.values())
+    text = " ".join((ROOT / file).read_text(encoding="utf-8").split())
+    for sentence in COUNTS[file]:
+        assert sentence.format(models=len(MODELS), materials=materials) in text
 
 
 def test_a_model_is_a_file():
