@@ -219,7 +219,7 @@ def _part(inputs, native, fit, color):
 
 
 def _is_closure(part):
-    """Whether one of Cycles' closures equals the part's model, whatever is linked to it. Roughnesses
+    """Whether a closure of Cycles' equals the part's model, whatever is linked to it. Roughnesses
     follow one socket, which does not change their ratio."""
     return pack.model(part.model).is_closure(part.values | dict.fromkeys(part.links))
 

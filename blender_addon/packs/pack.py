@@ -140,7 +140,7 @@ class Model:
         return None
 
     def is_closure(self, values):
-        """Whether one of Cycles' closures equals the model at these values; None stands for one that
+        """Whether a closure of Cycles' equals the model at these values; None stands for one that
         is linked. Formula Nodes and the aimed form are then that closure."""
         from ..brdfc import model as formulas
 
