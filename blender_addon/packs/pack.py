@@ -139,6 +139,13 @@ class Model:
                 return form
         return None
 
+    @cached_property
+    def may_be_closure(self):
+        """Whether is_closure() holds for some values."""
+        from ..brdfc import model as formulas
+
+        return any(found.whole for found in formulas(self.name).formulas.values())
+
     def is_closure(self, values):
         """Whether a closure of Cycles' equals the model at these values; None stands for one that
         is linked. Formula Nodes and the aimed form are then that closure."""

@@ -119,6 +119,9 @@ def of_material(material):
     for node in (shown.node for shown in shader_trees.shown(material)):
         if model_nodes.is_ours(node) and (made := model_nodes.manifest_entry(node)):
             aimed_at = made.form.get("lamps") or 0
+            if aimed_at and model_nodes.is_closure(node):
+                slots += _times(node) * _NATIVE_SLOTS["ShaderNodeBsdfMetallic"]
+                continue
             slots += _times(node) * (made.form.get("slots", 0) - aimed_at * a_lamp)
             slots_per_lamp += _times(node) * a_lamp * bool(aimed_at)
             if aimed_at and model_nodes.identity(node).form == "nodes":

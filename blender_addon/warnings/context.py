@@ -14,8 +14,7 @@ from . import closure_slots
 
 #: Nodes of a world with a uniform colour.
 _PLAIN_WORLD = {"ShaderNodeBackground", "ShaderNodeOutputWorld"}
-#: Forms that are one of Cycles' closures where that equals the model, and what is then to be said.
-_WITH_CLOSURES = ("aimed", "nodes")
+#: What is to be said of a form that is one of Cycles' closures.
 _OF_CLOSURES = ("caustics", "filter_glossy")
 
 
@@ -118,20 +117,13 @@ class NodeContext:
         if stood_in:
             twin = twin_of(node)
             self.form = twin.entry if twin else {}
-        elif self.is_current and self._is_closure():
+        elif self.is_current and model_nodes.is_closure(node):
             kept = [code for code in self.form.get("warnings", []) if code in _OF_CLOSURES]
             self.form = self.form | {"warnings": kept, "lamps": 0}
         in_cycles = self.of_scene.in_cycles
         #: The form if Cycles renders it, and the number of lamps that it aims at.
         self.cycles_form = self.form if in_cycles else {}
         self.aims = self.cycles_form.get("lamps") or 0
-
-    def _is_closure(self):
-        """Whether the node's form is one of Cycles' closures at its values."""
-        model, form = model_nodes.identity(self.node)
-        if form not in _WITH_CLOSURES:
-            return False
-        return pack.model(model).is_closure(model_nodes.constants(self.node))
 
     @property
     def lamps(self):
