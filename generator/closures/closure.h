@@ -74,7 +74,7 @@ template <class T> struct Closure {
   bool turned = false;                 ///< true if `normal` is not the surface's; it must not point below the surface
   Tangent stretched = Tangent::None;   ///< the kind of `tangent`
   /// Ggx, Beckmann: true if facets have metal_fresnel(), as in Blender's Metallic BSDF with the Fresnel type F82 Tint,
-  /// which has no weight but 0 and 1. With a white Edge Tint generalized_schlick_bsdf() is the same.
+  /// whose weight is a Mix Shader, from 0 to 1. With a white Edge Tint generalized_schlick_bsdf() is the same.
   bool metal = false;
 
   Closure(ClosureKind kind_, const Rgb<T>& weight_)

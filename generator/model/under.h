@@ -5,8 +5,8 @@
 // A model declares them as under(wo), and registers that with BRDFC_UNDER after BRDFC_MODEL. For any parameters and
 // directions their sum is at most f cos(theta_i), but for 2e-4 of the model's light; weights are not negative. They are
 // of kinds that Blender has a node for: Diffuse, OrenNayar with the weight 1, DiffuseToon, Ggx and Beckmann, also as
-// metal with a grey weight of 0 or 1, all about the surface's normal. Anisotropic facets are stretched along the x axis
-// or the view. For all choices the kinds are the same; a choice may have the weight 0.
+// metal with a grey weight from 0 to 1, all about the surface's normal. Anisotropic facets are stretched along the x
+// axis or the view. For all choices the kinds are the same; a choice may have the weight 0.
 //
 // A model that these closures equal for some parameters says so by whole(), and is then made of them alone, in the form
 // of nodes and in the aimed form.

@@ -52,6 +52,7 @@ template <class T> struct Microfacet {
 
   enum { Ggx, Beckmann, MultiscatterGgx };
   enum { SmithCorrelated, SmithSeparable, VCavity };
+  static constexpr double kGrey = 1e-5;
 
   static ModelInfo info() {
     return {.name = "microfacet",
@@ -118,9 +119,9 @@ template <class T> struct Microfacet {
     return named("F", (f0 + (Rgb<T>(T(1)) - f0) * pow5(one_minus_oh)) * (Rgb<T>(untinted) + tint * q));
   }
 
-  /// The factor by which interreflection raises f.
-  Rgb<T> compensation(const Vec3<T>& wo) const {
-    if (distribution != MultiscatterGgx) return Rgb<T>(T(1));
+  /// (1 - E) / E: what interreflection of the share 1 adds to f, over f.
+  T gain(const Vec3<T>& wo) const {
+    if (distribution != MultiscatterGgx) return T(0);
     const T alpha = named("alpha", sqrt(ax * ay)), z = maximum(wo.z, T(0)), m = named("m", z / (z + alpha));
     const T root = sqrt(m), x = named("x", T(2) * root - T(1)), y = named("y", T(2) * alpha - T(1));
     T sum(0);
@@ -130,7 +131,12 @@ template <class T> struct Microfacet {
       sum = sum * x + row;
     }
     const T lost = named("lost", root * sqrt(root) * (T(1) - m) * sum);
-    return named("compensation", Rgb<T>(T(1)) + again * (lost / (T(1) - lost)));
+    return named("gain", lost / (T(1) - lost));
+  }
+  /// The factor by which interreflection raises f.
+  Rgb<T> compensation(const Vec3<T>& wo) const {
+    if (distribution != MultiscatterGgx) return Rgb<T>(T(1));
+    return named("compensation", Rgb<T>(T(1)) + again * gain(wo));
   }
 
   Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
@@ -173,35 +179,46 @@ template <class T> struct Microfacet {
   /// Metal has the F of Kutz and others. With b = S(1/7) it is S - (1 - tint) b q, which is not above this F,
   /// S - (1 - tint) S q, as long as S is at most b: where facets are seen at 82 degrees or less. Light comes from
   /// within 90 degrees of the normal, so all facets are, seen from a cosine of kSteep or more. From below, the tint of
-  /// the metal is 1 - (1 - tint) / b, which makes it darker than this F for S up to 1. Interreflection, and facets that
-  /// the closure can't stretch so far, are added or replaced with the least F: S is at least f0, and q at most 1.
+  /// the metal is 1 - (1 - tint) / b, which makes it darker than this F for S up to 1. The grey part of interreflection
+  /// is a second metal. The colour of interreflection, and facets that the closure can't stretch so far, have the least
+  /// F: S is at least f0, and q at most 1.
   ClosureSum<T> under(const Vec3<T>& wo) const {
     constexpr double kSteep = 0.2829;  // cos(2 acos(1/7) - 90 degrees)
-    const Rgb<T> one(T(1)), none(T(0)), compensated = compensation(wo), least = f0 * tint;
+    const Rgb<T> one(T(1)), none(T(0)), least = f0 * tint;
     const bool smith = has_masking(SmithCorrelated);
     // Without a tint Cycles, which multiplies the two conditions, does not have to compare the view.
     const auto grazing = wo.z < T(kSteep) && T(0) < max_component(one - tint);
     const Rgb<T> edge = select(grazing, one - (one - tint) / fresnel_at_82(f0), tint);
     const T is_metal = select(T(kLeastAspect) <= aspect() && max_component(one - edge) <= T(1), T(1), T(0));
-    const auto metal = [&](ClosureKind kind, bool is_this) {
-      Closure<T> c = facets(kind, smith && is_this ? Rgb<T>(is_metal) : none, ax, ay, T(0));
+    const bool is_again = smith && distribution == MultiscatterGgx;
+    const T more = is_again ? is_metal * minimum(grey_again() * gain(wo), T(1)) : T(0);
+    const auto metal = [&](ClosureKind kind, const T& weight) {
+      Closure<T> c = facets(kind, Rgb<T>(weight), ax, ay, T(0));
       c.metal = true;
       c.f0 = f0;
       c.edge = edge;
       return c;
     };
     const auto rest = [&](ClosureKind kind, bool is_this) {
-      return facets(kind, smith && is_this ? least * (compensated - Rgb<T>(is_metal)) : none, ax, ay, T(0));
+      const Rgb<T> left = compensation(wo) - Rgb<T>(is_metal + more);
+      return facets(kind, smith && is_this ? least * left : none, ax, ay, T(0));
     };
-    return {metal(ClosureKind::Ggx, !is_beckmann()), metal(ClosureKind::Beckmann, is_beckmann()),
+    return {metal(ClosureKind::Ggx, smith && !is_beckmann() ? is_metal : T(0)),
+            metal(ClosureKind::Beckmann, smith && is_beckmann() ? is_metal : T(0)), metal(ClosureKind::Ggx, more),
             rest(ClosureKind::Ggx, !is_beckmann()), rest(ClosureKind::Beckmann, is_beckmann())};
   }
   T aspect() const { return minimum(ax, ay) / maximum(ax, ay); }
+  /// The least channel, with rounding. Where no channel is above it by kGrey, interreflection is grey.
+  T grey_again() const { return T(1) - max_component(Rgb<T>(T(1)) - again); }
 
-  /// With a white tint F is Schlick's.
+  /// With a white tint F is Schlick's. gain() is 2.27 at most, and 1 for alpha up to 0.7.
   T whole() const {
-    if (!has_masking(SmithCorrelated) || distribution == MultiscatterGgx) return T(0);
-    return select(max_component(Rgb<T>(T(1)) - tint) <= T(0) && T(kLeastAspect) <= aspect(), T(1), T(0));
+    if (!has_masking(SmithCorrelated)) return T(0);
+    auto stands = max_component(Rgb<T>(T(1)) - tint) <= T(0) && T(kLeastAspect) <= aspect();
+    if (distribution == MultiscatterGgx)
+      stands =
+          stands && max_component(again) <= grey_again() + T(kGrey) && (grey_again() <= T(0.44) || ax * ay <= T(0.49));
+    return select(stands, T(1), T(0));
   }
 };
 

@@ -183,7 +183,10 @@ TEST(Under, IsAllOfTheModelWhereItSaysSo) {
                               {{"distribution=beckmann", "ax=0.3", "ay=0.8"}, true},
                               {{"tint=1,1,0.999"}, false},
                               {{"ax=0.5", "ay=0.0499"}, false},
-                              {{"distribution=multiscatter_ggx"}, false},
+                              {{"distribution=multiscatter_ggx"}, true},
+                              {{"distribution=multiscatter_ggx", "f0=0.04", "again=0.05", "ax=1", "ay=1"}, true},
+                              {{"distribution=multiscatter_ggx", "ax=0.9", "ay=0.9"}, false},
+                              {{"distribution=multiscatter_ggx", "again=0.5,0.4,0.4"}, false},
                               {{"masking=smith_separable"}, false},
                               {{"distribution=beckmann", "masking=v_cavity"}, false}};
   const Model& m = find_model("microfacet");
