@@ -17,8 +17,8 @@ def metal(roughness, tint=1.0):
     return "principled", {"Metallic": 1.0} | look
 
 
-def plastic(roughness):
-    return "principled", {"Roughness": roughness, "Base_Color": BLACK}
+def plastic(roughness, ior=1.5):
+    return "principled", {"Roughness": roughness, "Base_Color": BLACK, "IOR": ior}
 
 
 #: Node, and whether the picture changes by more than 1 %.
@@ -28,7 +28,8 @@ CASES = [
     (metal(0.6, 0.95), True),
     (metal(0.7), False),
     (metal(0.0), False),  # its model is a mirror, too
-    (plastic(0.3), True),
+    (plastic(0.3), False),  # as the metal of 0.1
+    (plastic(0.3, 2.5), True),
     (plastic(0.5), False),
     (("glossy", {"Roughness": 0.4, "Color": WHITE}), False),
     (("diffuse", {"Roughness": 0.4, "Color": WHITE}), False),
