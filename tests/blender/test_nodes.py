@@ -494,14 +494,16 @@ def metallic(**inputs):
     ],
     ids=str,
 )
-@pytest.mark.parametrize("linked", [False, True], ids=["constant", "linked"])
-def test_a_metal_is_blenders_own(extension, empty, values, inputs, linked):
+@pytest.mark.parametrize(
+    ("form", "linked"), [("nodes", False), ("nodes", True), ("aimed", False), ("aimed", True)]
+)
+def test_a_metal_is_blenders_own(extension, empty, values, inputs, form, linked):
     """Rough metals with a white Edge Tint, under a lamp and a sky, with the same random numbers."""
-    settings(extension, empty, 16, osl=False, size=32)
+    settings(extension, empty, 16, osl=form == "aimed", size=32)
     add_camera(empty)
     add_world(empty, 0.3)
     add_lamp(empty, location=(4, -5, 4), energy=500, shadow_soft_size=0.5)
-    material = extension.api.new_material("microfacet", "nodes", **values)
+    material = extension.api.new_material("microfacet", form, **values)
     if linked:
         (node,) = extension.model_nodes.group_nodes(material)
         sockets, tree = extension.model_nodes.sockets(node), material.node_tree
