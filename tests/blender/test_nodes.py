@@ -45,7 +45,9 @@ def test_a_sun_without_an_angle(extension, empty, tool, few_of, towards):
         extension, empty, tool, "nodes", towards, 32, few_of, pictures=4, least=least
     )
     assert {name for name, *_ in found} == {
-        name for name, model in extension.api.models().items() if model["scatter"]
+        name
+        for name, model in extension.api.models().items()
+        if model["scatter"] and "nodes" in model["representations"]
     }
     for name, values, off, noise, _ in found:
         # A power of a cosine in single precision, as in test_aimed.py.
