@@ -246,8 +246,10 @@ def test_a_picture_of_plastic_is_as_before(extension, convert, empty, normal, ro
     assert convert.apply([plan]) == 1
     after = flat(empty, material)
     print(f"{before} and {after}")
-    # Bent back, the normal is at 45 degrees, where the polynomial in two numbers is less exact.
-    worst = 0.05 if normal[1] > 0 and roughness == "linked" else 0.02
+    # Bent back, the normal is at 45 degrees. Only the layer is left there, whose Fresnel term is
+    # Schlick's; and the polynomial in two numbers is less exact.
+    away = 0.065 if roughness == "linked" else 0.025
+    worst = away if normal[1] > 0 else 0.02
     for x, y in zip(before, after, strict=True):
         assert y == pytest.approx(x, rel=worst)
     assert convert.restore(material) == 1
