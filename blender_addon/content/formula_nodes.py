@@ -198,7 +198,7 @@ def _wired(w, data, normal, tangent, parameters, of_slots, cones, title):
         given |= {"stands": w.math("LESS_THAN", bent, 1e-4)}
         given |= parts.add("base", **given)
         shaders += [_of_base(w, closure, given, surface) for closure in data["base"]]
-    lamps, others = [], []
+    lamps = []
     # All closures of a shading point are sampled with the same numbers: they are added up, so they
     # need not be independent.
     given |= {f"u_{i}": number for i, number in enumerate(surface.drawn)}
@@ -210,7 +210,7 @@ def _wired(w, data, normal, tangent, parameters, of_slots, cones, title):
         here |= dict(frame)
         given |= here | constants
         lamps = formula_lamps.seen(w, parts, of_slots, cones, here, data["widest"])
-    others.append(_rest(w, parts, surface, given, lamps, data["narrow"]))
+    others = [_rest(w, parts, surface, given, lamps, data["narrow"])]
     others += formula_lamps.closures(w, parts, lamps, cones, given)
     if parts.has("whole"):
         others = [w.shown(parts.add("whole", **parameters)["others"], w.sum(others))]

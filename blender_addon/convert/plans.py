@@ -331,9 +331,9 @@ def _plan_node(material, node, inputs):
         more |= {"material": material, "node": node}
         more |= {"error": max(errors), "least_error": min(errors)}
         more |= {"anisotropic": any(look["stretch"] != 1 for look in looks)}
-        own = all(_is_closure(one) for one in (part, more.get("metal")) if one)
         blurred = any(is_filtered(Native(**given, **look)) for look in looks)
-        more |= {"filtered": blurred and not own}
+        models = (one for one in (part, more.get("metal")) if one)
+        more |= {"filtered": blurred and not all(map(_is_closure, models))}
         cause = functools.cache(functools.partial(_cause, given, looks, max(errors), error_without))
         return Plan(**vars(part), **more, cause=cause)
 
