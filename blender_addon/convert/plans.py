@@ -219,9 +219,13 @@ def _part(inputs, native, fit, color):
 
 
 def _is_closure(part):
-    """Whether a closure of Cycles' equals the part's model, whatever is linked to it. Roughnesses
-    follow one socket, which does not change their ratio."""
-    return pack.model(part.model).is_closure(part.values | dict.fromkeys(part.links))
+    """Whether closures of Cycles equal the part's model, whatever is linked to it. Roughnesses
+    follow one socket, which does not change their ratio. Interreflection that follows the colour
+    (`again`) is never so much that no closures equal it, which black stands for."""
+    values = part.values | dict.fromkeys(part.links)
+    if part.again:
+        values |= {"again": (0.0, 0.0, 0.0)}
+    return pack.model(part.model).is_closure(values)
 
 
 def _errors(found):

@@ -52,7 +52,7 @@ template <class T> struct Microfacet {
 
   enum { Ggx, Beckmann, MultiscatterGgx };
   enum { SmithCorrelated, SmithSeparable, VCavity };
-  static constexpr double kGrey = 1e-5;
+  static constexpr double kGrey = 1e-5;  // of channels that are equal but for rounding
 
   static ModelInfo info() {
     return {.name = "microfacet",
@@ -179,45 +179,66 @@ template <class T> struct Microfacet {
   /// Metal has the F of Kutz and others. With b = S(1/7) it is S - (1 - tint) b q, which is not above this F,
   /// S - (1 - tint) S q, as long as S is at most b: where facets are seen at 82 degrees or less. Light comes from
   /// within 90 degrees of the normal, so all facets are, seen from a cosine of kSteep or more. From below, the tint of
-  /// the metal is 1 - (1 - tint) / b, which makes it darker than this F for S up to 1. The grey part of interreflection
-  /// is a second metal. The colour of interreflection, and facets that the closure can't stretch so far, have the least
-  /// F: S is at least f0, and q at most 1.
+  /// the metal is 1 - (1 - tint) / b, which makes it darker than this F for S up to 1. Facets that the closure can't
+  /// stretch so far have the least F: S is at least f0, and q at most 1.
+  ///
+  /// Interreflection multiplies F by a colour w, which metal can't have. With a white tint and p = (1 - c)^5
+  ///   w S = w f0 + w (1 - f0) p = W (g + (1 - g) p) + (w - W),  g = 1 - w (1 - f0) / W,
+  /// which is metal of the reflectance g and the grey weight W, and Glossy of the colour w - W. Both exist for a W from
+  /// the largest channel of w (1 - f0) to the least of w; two metals have W up to 2.
   ClosureSum<T> under(const Vec3<T>& wo) const {
     constexpr double kSteep = 0.2829;  // cos(2 acos(1/7) - 90 degrees)
-    const Rgb<T> one(T(1)), none(T(0)), least = f0 * tint;
+    const Rgb<T> one(T(1)), none(T(0)), least = f0 * tint, w = compensation(wo);
     const bool smith = has_masking(SmithCorrelated);
     // Without a tint Cycles, which multiplies the two conditions, does not have to compare the view.
     const auto grazing = wo.z < T(kSteep) && T(0) < max_component(one - tint);
     const Rgb<T> edge = select(grazing, one - (one - tint) / fresnel_at_82(f0), tint);
-    const T is_metal = select(T(kLeastAspect) <= aspect() && max_component(one - edge) <= T(1), T(1), T(0));
-    const bool is_again = smith && distribution == MultiscatterGgx;
-    const T more = is_again ? is_metal * minimum(grey_again() * gain(wo), T(1)) : T(0);
+    const auto is_metal = T(kLeastAspect) <= aspect() && max_component(one - edge) <= T(1);
+    T W(1), more(0);
+    Rgb<T> g = f0, share = least;  // `share`: of w - W
+    if (smith && distribution == MultiscatterGgx) {
+      const Rgb<T> rising = w * (one - f0);
+      const T highest = minimum(T(1) + grey_again() * gain(wo), T(2));
+      const auto is_white = max_component(one - tint) <= T(0);
+      W = select(is_white, minimum(maximum(max_component(rising), T(1)), highest), highest);
+      const auto is_all = is_metal && is_white && max_component(rising) <= W + T(kGrey);
+      g = select(is_all, one - rising / W, f0);
+      share = select(is_all, one, least);
+      more = select(is_metal, W - T(1), T(0));
+    }
     const auto metal = [&](ClosureKind kind, const T& weight) {
       Closure<T> c = facets(kind, Rgb<T>(weight), ax, ay, T(0));
       c.metal = true;
-      c.f0 = f0;
+      c.f0 = g;
       c.edge = edge;
       return c;
     };
+    const Rgb<T> left = share * (w - Rgb<T>(select(is_metal, W, T(0))));
     const auto rest = [&](ClosureKind kind, bool is_this) {
-      const Rgb<T> left = compensation(wo) - Rgb<T>(is_metal + more);
-      return facets(kind, smith && is_this ? least * left : none, ax, ay, T(0));
+      return facets(kind, smith && is_this ? left : none, ax, ay, T(0));
     };
-    return {metal(ClosureKind::Ggx, smith && !is_beckmann() ? is_metal : T(0)),
-            metal(ClosureKind::Beckmann, smith && is_beckmann() ? is_metal : T(0)), metal(ClosureKind::Ggx, more),
+    const T first = select(is_metal, T(1), T(0));
+    return {metal(ClosureKind::Ggx, smith && !is_beckmann() ? first : T(0)),
+            metal(ClosureKind::Beckmann, smith && is_beckmann() ? first : T(0)), metal(ClosureKind::Ggx, more),
             rest(ClosureKind::Ggx, !is_beckmann()), rest(ClosureKind::Beckmann, is_beckmann())};
   }
   T aspect() const { return minimum(ax, ay) / maximum(ax, ay); }
-  /// The least channel, with rounding. Where no channel is above it by kGrey, interreflection is grey.
+  /// The least channel. Where no channel is above it by kGrey, interreflection is grey.
   T grey_again() const { return T(1) - max_component(Rgb<T>(T(1)) - again); }
 
-  /// With a white tint F is Schlick's. gain() is 2.27 at most, and 1 for alpha up to 0.7.
+  /// With a white tint F is Schlick's. Of interreflection, w is linear in gain(), so the metals of under() exist for
+  /// all views if they do where gain() is largest: 0.13 + 2.15 alpha^2 at most. Grey interreflection needs no look at
+  /// f0, which may not be known.
   T whole() const {
     if (!has_masking(SmithCorrelated)) return T(0);
-    auto stands = max_component(Rgb<T>(T(1)) - tint) <= T(0) && T(kLeastAspect) <= aspect();
-    if (distribution == MultiscatterGgx)
-      stands =
-          stands && max_component(again) <= grey_again() + T(kGrey) && (grey_again() <= T(0.44) || ax * ay <= T(0.49));
+    const Rgb<T> one(T(1));
+    auto stands = max_component(one - tint) <= T(0) && T(kLeastAspect) <= aspect();
+    if (distribution == MultiscatterGgx) {
+      const T most = T(0.13) + T(2.15) * ax * ay, least = T(1) + grey_again() * most;
+      const T rising = max_component((one + again * most) * (one - f0));
+      const auto is_grey = max_component(again) <= grey_again() + T(kGrey);
+      stands = stands && ((is_grey && least <= T(2)) || rising <= minimum(least, T(2)) + T(kGrey));
+    }
     return select(stands, T(1), T(0));
   }
 };

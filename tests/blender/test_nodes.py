@@ -493,6 +493,10 @@ def metallic(**inputs):
         ({"distribution": "beckmann"}, {"distribution": "BECKMANN"}),
         ({"ax": 0.8, "ay": 0.1}, {"Anisotropy": (1 - 0.1 / 0.8) / 0.9}),
         ({"ax": 0.1, "ay": 0.8}, {"Anisotropy": (1 - 0.1 / 0.8) / 0.9, "Rotation": 0.25}),
+        (
+            {"distribution": "multiscatter_ggx", "again": (0.8896, 0.5794, 0.2978)},
+            {"distribution": "MULTI_GGX"},
+        ),
     ],
     ids=str,
 )
@@ -500,7 +504,8 @@ def metallic(**inputs):
     ("form", "linked"), [("nodes", False), ("nodes", True), ("aimed", False), ("aimed", True)]
 )
 def test_a_metal_is_blenders_own(extension, empty, values, inputs, form, linked):
-    """Rough metals with a white Edge Tint, under a lamp and a sky, with the same random numbers."""
+    """Rough metals with a white Edge Tint, under a lamp and a sky, with the same random numbers.
+    What facets reflect again Cycles has from a table of 32 views and roughnesses."""
     settings(extension, empty, 16, osl=form == "aimed", size=32)
     add_camera(empty)
     add_world(empty, 0.3)
@@ -524,10 +529,10 @@ def test_a_metal_is_blenders_own(extension, empty, values, inputs, form, linked)
     ball.data.materials[0] = metallic(**inputs)
     blenders = render(empty)[..., :3]
     assert ours.max() > 0.5
-    off = np.abs(ours - blenders)
-    assert off.mean() < 1e-4 * blenders.mean()
+    off, is_table = np.abs(ours - blenders), "again" in values
+    assert off.mean() < (1e-3 if is_table else 1e-4) * blenders.mean()
     # A tangent that is turned differs by rounding, which takes single paths elsewhere.
-    assert np.mean(off > 1e-3 * blenders) < 0.01
+    assert np.mean(off > (5e-3 if is_table else 1e-3) * blenders) < 0.01
 
 
 def test_links_and_ranges(extension, empty, tool):

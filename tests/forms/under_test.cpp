@@ -186,7 +186,12 @@ TEST(Under, IsAllOfTheModelWhereItSaysSo) {
                               {{"distribution=multiscatter_ggx"}, true},
                               {{"distribution=multiscatter_ggx", "f0=0.04", "again=0.05", "ax=1", "ay=1"}, true},
                               {{"distribution=multiscatter_ggx", "ax=0.9", "ay=0.9"}, false},
-                              {{"distribution=multiscatter_ggx", "again=0.5,0.4,0.4"}, false},
+                              {{"distribution=multiscatter_ggx", "again=0.5,0.4,0.4"}, true},
+                              {{"distribution=multiscatter_ggx", "f0=1,0.8,0.3", "again=1,0.75,0.3"}, true},
+                              {{"distribution=multiscatter_ggx", "f0=1,0.8,0.3", "again=0.9,0.6,0.1", "ax=1", "ay=1"},
+                               true},
+                              {{"distribution=multiscatter_ggx", "f0=0.8,0,0", "again=0.7,0.03,0.03"}, true},
+                              {{"distribution=multiscatter_ggx", "f0=0.1,0.8,0.3", "again=1,0,0"}, false},
                               {{"masking=smith_separable"}, false},
                               {{"distribution=beckmann", "masking=v_cavity"}, false}};
   const Model& m = find_model("microfacet");
