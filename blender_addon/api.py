@@ -22,7 +22,7 @@ from . import convert, lamps, lean, library, measured
 from .common import argument_checks, editable, enabling, files
 from .common.i18n import say
 from .content.compiler import CompileError
-from .groups import automatic, bump_correction, model_nodes, nodes, update, usage
+from .groups import automatic, bump_correction, model_nodes, nodes, stacks, update, usage
 from .groups.update import Update
 from .lamps import Lamp
 from .lean import PlanError
@@ -49,6 +49,7 @@ __all__ = [
     "MeasuredLibrary",
     "Update",
     "add_albedo",
+    "add_coat",
     "add_library",
     "albedo",
     "bake",
@@ -62,6 +63,7 @@ __all__ = [
     "make_local",
     "measured_fits",
     "models",
+    "new_layers",
     "new_material",
     "new_measured_library",
     "new_measured_material",
@@ -87,6 +89,9 @@ __all__ = [
     "write_materials",
 ]
 
+
+#: What `microfacet` is as a coat, unless its caller says otherwise.
+_VARNISH = {"f0": (0.04, 0.04, 0.04), "ax": 0.01, "ay": 0.01}
 
 _NO_MATERIAL = say("No material of this file has a reflection model of brdfc")
 
@@ -215,6 +220,55 @@ def new_sum(lobes, representation="auto", name="Sum"):
     `[("lambert", {"rho": (0.2, 0.1, 0.1)}), ("ward", {})]`, or those of a fitted sum. Raises
     ValueError, and what new_material() raises; after an error nothing is left in the file.
     """
+    return _new_stack(lobes, representation, name, _add_up)
+
+
+def new_layers(layers, representation="auto", name="Layers"):
+    """Makes a material of models that lie one over another; the first is on top.
+
+    What lies below a layer gets the light that the layer leaves: 1 minus the largest channel of
+    its albedo for the view. So no light is gained, as in the Principled node; and as there, light
+    is not attenuated by its own direction, so the material is not reciprocal. `layers` is as for
+    new_sum(), which says what is raised.
+    """
+    return _new_stack(layers, representation, name, _put_over)
+
+
+def add_coat(material, model="microfacet", representation="auto", **parameters):
+    """Puts a model over all that a material shows, of whatever nodes, as new_layers() does, and
+    returns its node. `microfacet` is a clear varnish with an IOR of 1.5, unless `parameters` say
+    otherwise: `f0` 0.04, `ax` and `ay` 0.01.
+
+    Raises ValueError, also where nothing leads to the material's surface, and CompileError; after
+    an error the material is as it was.
+    """
+    editable.check(argument_checks.material(material))
+    if model == "microfacet":
+        parameters = _VARNISH | parameters
+    (pair,) = measured.as_pairs([(model, parameters)])
+    form, values = _checked(model, representation, pair[1])
+    below, target = stacks.surface_of(material)
+    coat = _add_model(
+        material.node_tree, model, "auto" if representation == "auto" else form, values
+    )
+    try:
+        stacks.put_over(coat, below, target)
+    except BaseException:
+        material.node_tree.nodes.remove(coat)
+        raise
+    prepare_material(material)
+    return coat
+
+
+def _add_model(tree, model, form, values):
+    """Adds a model's node with these values to a tree."""
+    node = nodes.add_group_node(tree, model, form, values)
+    for parameter, value in values.items():
+        model_nodes.set_value(node, parameter, value)
+    return node
+
+
+def _new_stack(lobes, representation, name, put_together):
     (first, values), *others = measured.as_pairs(lobes)
     checked = [(model, *_checked(model, representation, given)) for model, given in others]
     material = new_material(first, representation, **values)
@@ -223,16 +277,29 @@ def new_sum(lobes, representation="auto", name="Sum"):
         added = []
         for model, form, values in checked:
             form = "auto" if representation == "auto" else form
-            added.append(nodes.add_group_node(tree, model, form, values))
-            for parameter, value in values.items():
-                model_nodes.set_value(added[-1], parameter, value)
-        measured.add_shaders(tree, node, added)
+            added.append(_add_model(tree, model, form, values))
+        put_together(tree, [node, *added])
         prepare_material(material)
     except BaseException:
         bpy.data.materials.remove(material)
         raise
     material.name = name
     return material
+
+
+def _add_up(tree, lobes):
+    stacks.add_shaders(tree, lobes[0], lobes[1:])
+
+
+def _put_over(tree, layers):
+    """From the lowest upwards."""
+    target = shader_trees.surface_link(tree).to_socket
+    below = layers[-1].outputs["BSDF"]
+    layers[-1].location.y -= 300 * (len(layers) - 1)
+    tree.links.new(below, target)
+    for layer in reversed(layers[:-1]):
+        stacks.put_over(layer, below, target)
+        below = target.links[0].from_socket
 
 
 def _the_node(material, node=None):

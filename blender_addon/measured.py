@@ -12,6 +12,7 @@ import bpy
 
 from .common.i18n import say
 from .common.program import ToolJob
+from .groups import stacks
 from .packs import pack
 
 #: What stands for the sum of lobes where a model is asked for.
@@ -212,22 +213,4 @@ def add_matte(tree, node, albedo):
     diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
     diffuse.inputs["Color"].default_value = (*albedo, 1.0)
     diffuse.inputs["Roughness"].default_value = 0.0
-    add_shaders(tree, node, [diffuse])
-
-
-def add_shaders(tree, node, others):
-    """Adds the light of other nodes to that of a model's node by Add Shader nodes. Links of the
-    node's BSDF lead to the sum afterwards."""
-    sum_so_far = node.outputs["BSDF"]
-    targets = [link.to_socket for link in sum_so_far.links]
-    x, y = node.location
-    for index, other in enumerate(others):
-        other.location = (x, y + 300 * (index + 1))
-        both = tree.nodes.new("ShaderNodeAddShader")
-        both.location = (x + 250 + 180 * index, y + 150 * (index + 1))
-        tree.links.new(other.outputs[0], both.inputs[0])
-        tree.links.new(sum_so_far, both.inputs[1])
-        sum_so_far = both.outputs[0]
-    for target in targets:
-        target.node.location.x += 180 * len(others) + 100
-        tree.links.new(sum_so_far, target)
+    stacks.add_shaders(tree, node, [diffuse])

@@ -189,8 +189,8 @@ class SceneLoader:
         tree.links.new(node.outputs[0], output.inputs["Surface"])
         return material
 
-    def _sum(self, name, view, representation):
-        """A material of several models."""
+    def _stack(self, name, view, key, representation):
+        """A material of several models, which are added up or lie one over another."""
         if representation is None:
             representation = (
                 view.get("representation").text() if view.has("representation") else "auto"
@@ -198,18 +198,20 @@ class SceneLoader:
         if representation in NATIVE:
             raise view.error(f"one model, to which Blender's {representation} node can be fitted")
         lobes = []
-        for _, lobe in view.get("sum").items():
+        for _, lobe in view.get(key).items():
             given = lobe.get("parameters") if lobe.has("parameters") else None
             values = {key: each.value for key, each in given.items()} if given else {}
             lobes.append((lobe.get("model").text(), values))
         try:
-            return self.api.new_sum(lobes, representation, name)
+            make = self.api.new_sum if key == "sum" else self.api.new_layers
+            return make(lobes, representation, name)
         except ValueError as error:
             raise ValueError(f"{view.file}: {view.path}: {error}") from error
 
     def _material(self, name, view, representation, native):
-        if view.has("sum"):
-            return self._sum(name, view, representation)
+        for key in ("sum", "layers"):
+            if view.has(key):
+                return self._stack(name, view, key, representation)
         model = view.get("model").text()
         if (
             model == "lambert"

@@ -14,6 +14,7 @@ from .measured import (
 )
 from .model import (
     BRDFC_OT_add_albedo,
+    BRDFC_OT_add_coat,
     BRDFC_OT_details,
     BRDFC_OT_kernel,
     BRDFC_OT_more,
@@ -37,6 +38,7 @@ _CLASSES = (
     BRDFC_OT_bake_plan,
     BRDFC_OT_bake_apply,
     BRDFC_OT_add_albedo,
+    BRDFC_OT_add_coat,
     BRDFC_OT_convert,
     BRDFC_OT_convert_back,
     BRDFC_OT_details,

@@ -158,6 +158,23 @@ class BRDFC_OT_add_albedo(ChangesActiveMaterial, Operator):
         return {"FINISHED"}
 
 
+class BRDFC_OT_add_coat(ChangesActiveMaterial, Operator):
+    bl_idname = "brdfc.add_coat"
+    bl_label = "Add Coat"
+    bl_description = (
+        "Put a clear varnish over the material, whatever nodes it has. What lies below gets the "
+        "light that the varnish does not reflect"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        try:
+            api.add_coat(context.object.active_material)
+        except ERRORS as error:
+            return refused(self, error)
+        return {"FINISHED"}
+
+
 class BRDFC_OT_kernel(ChangesActiveMaterial, Operator):
     bl_idname = "brdfc.kernel"
     bl_label = "Kernel from Float Curve"

@@ -72,6 +72,7 @@ def draw_material_menu(self, context):
     self.layout.operator("brdfc.new_measured_material", icon="FILE_FOLDER")
     self.layout.operator("brdfc.new_measured_library", icon="ASSET_MANAGER")
     self.layout.operator("brdfc.convert", icon="FILE_REFRESH")
+    self.layout.operator("brdfc.add_coat", icon="NODE_MATERIAL")
 
 
 def error_text(entry):

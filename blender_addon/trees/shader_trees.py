@@ -80,6 +80,12 @@ def _link(socket):
     return next(filter(counts, socket.links), None) if socket.is_linked else None
 
 
+def surface_link(tree):
+    """The link to the surface that Cycles shows, or None."""
+    socket = _surface(tree)
+    return None if socket is None else _link(socket)
+
+
 def _group_end(group):
     """The active output node of a group, or None."""
     ends = [n for n in group.nodes if n.bl_idname == "NodeGroupOutput"]

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/sequence.h"
+#include "measure/albedo.h"
 #include "model/sampling.h"
 
 namespace brdfc::measured {
@@ -13,7 +14,10 @@ constexpr int kShareRows = 32, kShareSamples = 256;
 /// A lobe that reflects anything at all is sampled at least so often, because its albedo is known for a few views only.
 constexpr double kLeast = 0.02;
 
-using Shares = SumModel::Shares;
+/// Where layers know what they let through: at the squares of equal steps from 0 to 1.
+constexpr int kPassedSteps = 128, kPassedSamples = 1 << 13;
+
+using Views = SumModel::Views;
 template <class Term> using Terms = std::vector<std::unique_ptr<Term>>;
 
 /// The lobe that a random number chooses; `u` becomes a random number for that lobe.
@@ -33,15 +37,15 @@ std::size_t choose(const std::vector<double>& shares, double& u) {
 
 class SumBrdf final : public OpaqueBrdf {
  public:
-  SumBrdf(Terms<Brdf<double>> terms, std::shared_ptr<const Shares> shares)
-      : terms_(std::move(terms)), shares_(std::move(shares)) {}
+  SumBrdf(Terms<Brdf<double>> terms, std::shared_ptr<const Views> views)
+      : terms_(std::move(terms)), views_(std::move(views)) {}
   Rgb<double> eval(const Vec3<double>& wi, const Vec3<double>& wo) const override {
     Rgb<double> f(0);
-    for (const auto& term : terms_) f += term->eval(wi, wo);
+    for (std::size_t k = 0; k < terms_.size(); ++k) f += views_->passed(k, wo.z) * terms_[k]->eval(wi, wo);
     return f;
   }
   double pdf(const Vec3<double>& wi, const Vec3<double>& wo) const override {
-    const std::vector<double>& shares = shares_->at(wo.z);
+    const std::vector<double>& shares = views_->shares(wo.z);
     double p = 0;
     for (std::size_t k = 0; k < terms_.size(); ++k)
       if (shares[k] > 0) p += shares[k] * terms_[k]->pdf(wi, wo);
@@ -49,7 +53,7 @@ class SumBrdf final : public OpaqueBrdf {
   }
   Sample<double> sample(const Vec3<double>& wo, const Vec3<double>& u) const override {
     double first = u.x;
-    const std::size_t k = choose(shares_->at(wo.z), first);
+    const std::size_t k = choose(views_->shares(wo.z), first);
     Sample<double> s = terms_[k]->sample(wo, {first, u.y, u.z});
     if (!(s.pdf > 0)) return {s.wi, Rgb<double>(0), 0};
     s.pdf = pdf(s.wi, wo);
@@ -58,28 +62,28 @@ class SumBrdf final : public OpaqueBrdf {
   }
   Rgb<double> mirror(const Vec3<double>& wo) const override {
     Rgb<double> out(0);
-    for (const auto& term : terms_) out += term->mirror(wo);
+    for (std::size_t k = 0; k < terms_.size(); ++k) out += views_->passed(k, wo.z) * terms_[k]->mirror(wo);
     return out;
   }
 
  private:
   Terms<Brdf<double>> terms_;
-  std::shared_ptr<const Shares> shares_;
+  std::shared_ptr<const Views> views_;
 };
 
 class PackedSum final : public OpaquePacked {
  public:
-  PackedSum(Terms<PackedBrdf> terms, std::shared_ptr<const Shares> shares)
-      : terms_(std::move(terms)), shares_(std::move(shares)) {}
+  PackedSum(Terms<PackedBrdf> terms, std::shared_ptr<const Views> views)
+      : terms_(std::move(terms)), views_(std::move(views)) {}
   PackedEvaluation evaluate(const Vec3<Pack>& wi, const Vec3<Pack>& wo) const override {
     PackedEvaluation out{Rgb<Pack>(Pack(0)), Pack(0)};
     std::array<const std::vector<double>*, kLanes> shares;
-    for (std::size_t lane = 0; lane < kLanes; ++lane) shares[lane] = &shares_->at(wo.z[lane]);
+    for (std::size_t lane = 0; lane < kLanes; ++lane) shares[lane] = &views_->shares(wo.z[lane]);
     for (std::size_t k = 0; k < terms_.size(); ++k) {
       const PackedEvaluation e = terms_[k]->evaluate(wi, wo);
       Pack share;
       for (std::size_t lane = 0; lane < kLanes; ++lane) share[lane] = (*shares[lane])[k];
-      out.f += e.f;
+      out.f += e.f * passed(k, wo);
       out.pdf = out.pdf + share * e.pdf;
     }
     return out;
@@ -89,7 +93,7 @@ class PackedSum final : public OpaquePacked {
     Vec3<Pack> v = u;
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       double first = u.x[lane];
-      chosen[lane] = choose(shares_->at(wo.z[lane]), first);
+      chosen[lane] = choose(views_->shares(wo.z[lane]), first);
       v.x[lane] = first;
     }
     Sample<Pack> out{{Pack(0), Pack(0), Pack(1)}, Rgb<Pack>(Pack(0)), Pack(0)};
@@ -114,13 +118,19 @@ class PackedSum final : public OpaquePacked {
   }
   Rgb<Pack> mirror(const Vec3<Pack>& wo) const override {
     Rgb<Pack> out(Pack(0));
-    for (const auto& term : terms_) out += term->mirror(wo);
+    for (std::size_t k = 0; k < terms_.size(); ++k) out += terms_[k]->mirror(wo) * passed(k, wo);
     return out;
   }
 
  private:
+  Pack passed(std::size_t k, const Vec3<Pack>& wo) const {
+    Pack out;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) out[lane] = views_->passed(k, wo.z[lane]);
+    return out;
+  }
+
   Terms<PackedBrdf> terms_;
-  std::shared_ptr<const Shares> shares_;
+  std::shared_ptr<const Views> views_;
 };
 
 Terms<Brdf<double>> terms_of(const std::vector<Lobe>& lobes) {
@@ -131,18 +141,32 @@ Terms<Brdf<double>> terms_of(const std::vector<Lobe>& lobes) {
 
 }  // namespace
 
-SumModel::Shares::Shares(const std::vector<std::unique_ptr<Brdf<double>>>& terms)
-    : of_row_(kShareRows, std::vector<double>(terms.size())) {
+Views::Views(const std::vector<std::unique_ptr<Brdf<double>>>& terms, Stack stack)
+    : shares_(kShareRows, std::vector<double>(terms.size())) {
+  if (stack == Stack::Layers) {
+    passed_.emplace_back(kPassedSteps + 1, 1.);
+    for (std::size_t k = 0; k + 1 < terms.size(); ++k) {
+      std::vector<double> below = passed_[k];
+      for (int i = 0; i <= kPassedSteps; ++i) {
+        const double x = std::max(i, 1) / double(kPassedSteps);  // no model has a value at the horizon
+        const measure::MeanAlbedo a = measure::mean_albedos(*terms[k], {terms[k].get()}, x * x, std::nullopt,
+                                                            fmt::format("layer {}", k + 1), kPassedSamples);
+        below[std::size_t(i)] *= std::max(1 - max_component(a.scattered[0] + a.mirror[0]), 0.);
+      }
+      passed_.push_back(std::move(below));
+    }
+  }
   for (int row = 0; row < kShareRows; ++row) {
-    std::vector<double>& shares = of_row_[std::size_t(row)];
+    std::vector<double>& shares = shares_[std::size_t(row)];
     double sum = 0;
     for (std::size_t k = 0; k < terms.size(); ++k) {
       Sequence3 points(std::uint64_t(row) + 1);
       Sequence2 views(std::uint64_t(row) + 101);
       for (int i = 0; i < kShareSamples; ++i) {
         const Point2 v = views.next();
-        const Sample<double> s = terms[k]->sample(direction((row + v.x) / kShareRows, 2 * kPi * v.y), points.next());
-        if (s.pdf > 0) shares[k] += luminance(s.weight) / kShareSamples;
+        const Vec3<double> wo = direction((row + v.x) / kShareRows, 2 * kPi * v.y);
+        const Sample<double> s = terms[k]->sample(wo, points.next());
+        if (s.pdf > 0) shares[k] += passed(k, wo.z) * luminance(s.weight) / kShareSamples;
       }
       sum += shares[k];
     }
@@ -154,23 +178,33 @@ SumModel::Shares::Shares(const std::vector<std::unique_ptr<Brdf<double>>>& terms
   }
 }
 
-const std::vector<double>& SumModel::Shares::at(double cosTheta_o) const {
-  return of_row_[std::size_t(std::clamp(int(cosTheta_o * kShareRows), 0, kShareRows - 1))];
+const std::vector<double>& Views::shares(double cosTheta_o) const {
+  return shares_[std::size_t(std::clamp(int(cosTheta_o * kShareRows), 0, kShareRows - 1))];
 }
 
-SumModel::SumModel(std::vector<Lobe> lobes)
-    : OpaqueModel({.name = "sum", .label = "Sum", .look = Look::Matte}), lobes_(std::move(lobes)) {
+double Views::passed(std::size_t lobe, double cosTheta_o) const {
+  if (passed_.empty()) return 1;
+  const double at = std::sqrt(std::clamp(cosTheta_o, 0., 1.)) * kPassedSteps;
+  const std::size_t i = std::min(std::size_t(at), std::size_t(kPassedSteps - 1));
+  return std::lerp(passed_[lobe][i], passed_[lobe][i + 1], at - double(i));
+}
+
+SumModel::SumModel(std::vector<Lobe> lobes, Stack stack)
+    : OpaqueModel({.name = stack == Stack::Layers ? "layers" : "sum",
+                   .label = stack == Stack::Layers ? "Layers" : "Sum",
+                   .look = Look::Matte}),
+      lobes_(std::move(lobes)) {
   std::vector<std::string> names;
   for (const Lobe& lobe : lobes_) {
     const ModelInfo& each = lobe.model->info();
     names.push_back(each.name);
     if (each.look != Look::Matte) info_.look = Look::Glossy;
-    info_.properties.reciprocal &= each.properties.reciprocal;
+    info_.properties.reciprocal &= each.properties.reciprocal && stack == Stack::Sum;
     info_.properties.isotropic &= each.properties.isotropic;
   }
-  info_.doc = fmt::format("{}", fmt::join(names, " + "));
+  info_.doc = fmt::format("{}", fmt::join(names, stack == Stack::Layers ? " over " : " + "));
   info_.properties.conserving = info_.properties.exact_sampling = false;
-  shares_ = std::make_shared<Shares>(terms_of(lobes_));
+  views_ = std::make_shared<Views>(terms_of(lobes_), stack);
 }
 
 bool SumModel::has_scatter() const {
@@ -181,12 +215,12 @@ bool SumModel::has_mirror() const {
 }
 
 std::unique_ptr<Brdf<double>> SumModel::make_double(const ParamValues&) const {
-  return std::make_unique<SumBrdf>(terms_of(lobes_), shares_);
+  return std::make_unique<SumBrdf>(terms_of(lobes_), views_);
 }
 std::unique_ptr<PackedBrdf> SumModel::make_packed(const ParamValues&) const {
   Terms<PackedBrdf> terms;
   for (const Lobe& lobe : lobes_) terms.push_back(lobe.model->make_packed(lobe.values));
-  return std::make_unique<PackedSum>(std::move(terms), shares_);
+  return std::make_unique<PackedSum>(std::move(terms), views_);
 }
 
 }  // namespace brdfc::measured

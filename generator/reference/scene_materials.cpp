@@ -61,8 +61,8 @@ class MaterialReader {
         scene_.materials.push_back(std::move(material));
         continue;
       }
-      if (m.has("sum")) {
-        read_sum(m, material, out[id]);
+      if (m.has("sum") || m.has("layers")) {
+        read_stack(m, m.has("sum") ? measured::Stack::Sum : measured::Stack::Layers, material, out[id]);
         scene_.materials.push_back(std::move(material));
         continue;
       }
@@ -117,16 +117,17 @@ class MaterialReader {
   }
 
  private:
-  /// Models that are added up, with constant parameters.
-  void read_sum(const JsonView& m, Material& material, json& resolved) {
-    m.only({"sum", "representation"});
-    if (alone_) m.at("sum").error("expected \"model\" in a file of materials alone");
+  /// Models that are added up, or that lie above others, with constant parameters.
+  void read_stack(const JsonView& m, measured::Stack stack, Material& material, json& resolved) {
+    const char* key = key_of(stack);
+    m.only({key, "representation"});
+    if (alone_) m.at(key).error("expected \"model\" in a file of materials alone");
     if (const auto v = m.find("representation")) material.representation = v->text();
     std::vector<std::string> names;
     for (const auto& [name, model] : models())
       if (!model->two_sided()) names.push_back(name);
     std::vector<measured::Lobe> lobes;
-    const JsonView list = m.at("sum");
+    const JsonView list = m.at(key);
     if (!list.json().is_array() || list.json().empty() || list.json().size() > kMostLobes)
       list.fail(fmt::format("1 to {} lobes", kMostLobes));
     for (const JsonView& each : list.elements()) {
@@ -135,7 +136,8 @@ class MaterialReader {
       const ModelInfo& info = lobe.model->info();
       if (const auto parameters = each.find("parameters"))
         for (const auto& [name, value] : parameters->members()) {
-          if (value.json().is_object()) value.error("expected a constant: textures are not for the lobes of a sum");
+          if (value.json().is_object())
+            value.error(fmt::format("expected a constant: textures are not for the lobes of {}", key));
           lobe.values[name] = read_value(value, parameter_named(name, value, info));
         }
       lobe.values = complete(info, lobe.values);
@@ -143,19 +145,21 @@ class MaterialReader {
         each.error("lets light through: expected lobes that reflect");
       lobes.push_back(std::move(lobe));
     }
-    set_sum(std::move(lobes), material, resolved);
+    set_stack(std::move(lobes), stack, material, resolved);
     const auto brdf = material.model->make_double({});
     if (const auto said =
             measured::gain_of_sum(measured::brightest_view(*brdf, material.model->info().properties.isotropic)))
       files_.note(fmt::format("{}: {}", list.key(), *said));
   }
 
-  static void set_sum(std::vector<measured::Lobe> lobes, Material& material, json& resolved) {
-    resolved = {{"sum", json::array()}, {"representation", material.representation}};
+  static const char* key_of(measured::Stack stack) { return stack == measured::Stack::Sum ? "sum" : "layers"; }
+
+  static void set_stack(std::vector<measured::Lobe> lobes, measured::Stack stack, Material& material, json& resolved) {
+    resolved = {{key_of(stack), json::array()}, {"representation", material.representation}};
     for (const measured::Lobe& lobe : lobes)
-      resolved["sum"].push_back({{"model", lobe.model->info().name}, {"parameters", to_json(lobe.values)}});
+      resolved[key_of(stack)].push_back({{"model", lobe.model->info().name}, {"parameters", to_json(lobe.values)}});
     material.sum = lobes;
-    material.own = std::make_shared<measured::SumModel>(std::move(lobes));
+    material.own = std::make_shared<measured::SumModel>(std::move(lobes), stack);
     material.model = material.own.get();
   }
 
@@ -224,7 +228,7 @@ class MaterialReader {
       misplaces("a sum of " + measured::counted(sum.lobes.size(), "lobe", "lobes"), sum.error,
                 fmt::format("{}", fmt::join(each, " + ")));
       if (const auto said = measured::gain_of_sum(sum.brightest)) files_.note(measurement.file + ": " + *said);
-      set_sum(sum.lobes, material, resolved);
+      set_stack(sum.lobes, measured::Stack::Sum, material, resolved);
       return;
     }
     if (name != "best") tried = {&find_model(name)};
@@ -240,7 +244,7 @@ class MaterialReader {
       const ParamValues rho{{"rho", std::array<double, 3>{fit.matte->r, fit.matte->g, fit.matte->b}}};
       misplaces(info.name + " with lambert", fit.error,
                 described(info, fit.values) + " + " + described(lambert.info(), rho));
-      set_sum({{fit.model, fit.values}, {&lambert, rho}}, material, resolved);
+      set_stack({{fit.model, fit.values}, {&lambert, rho}}, measured::Stack::Sum, material, resolved);
       return;
     }
     misplaces(info.name, fit.error, described(info, fit.values));

@@ -234,6 +234,58 @@ def test_blender_and_the_reference_have_one_sum(ball, in_blender, osl):
     np.testing.assert_allclose(got.mean((0, 1)), expected.mean((0, 1)), rtol=0.01)
 
 
+LAYERS = {
+    "layers": [
+        {"model": "microfacet", "parameters": {"f0": [0.04, 0.06, 0.1], "ax": 0.2, "ay": 0.2}},
+        {"model": "cook_torrance", "parameters": {"m": 0.3, "f0": [0.3, 0.2, 0.3]}},
+        {"model": "lambert", "parameters": {"rho": [0.8, 0.3, 0.1]}},
+    ]
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("osl", [True, False])
+def test_blender_and_the_reference_have_the_same_layers(ball, in_blender, osl):
+    """What lies below is dimmed: blocks differ by noise, and from those of the sum."""
+    file, expected = ball("layers", LAYERS)
+    got = in_blender(file, osl)
+    _, added = ball("added", {"sum": LAYERS["layers"]})
+    assert np.abs(got / expected - 1).max() < 0.03
+    assert np.abs(added / expected - 1).max() > 0.15
+    np.testing.assert_allclose(got.mean((0, 1)), expected.mean((0, 1)), rtol=0.01)
+
+
+@pytest.mark.parametrize("native", [True, False])
+def test_a_coat_lies_over_any_nodes(extension, empty, native):
+    """A white ball under varnish in a white world stays white; after an error nothing changes."""
+    if native:
+        material = helpers.node_material("ShaderNodeBsdfDiffuse", Color=(1.0, 1.0, 1.0, 1.0))
+    else:
+        material = extension.api.new_material("lambert", rho=1.0)
+    names = set(material.node_tree.nodes.keys())
+    with pytest.raises(ValueError, match="ax"):
+        extension.api.add_coat(material, ax=5)
+    with pytest.raises(ValueError, match="lets light through"):
+        extension.api.add_coat(material, "glass")
+    assert set(material.node_tree.nodes.keys()) == names
+    coat = extension.api.add_coat(material, ax=0.2, ay=0.2)
+    assert extension.model_nodes.get_value(coat, "f0") == pytest.approx((0.04,) * 3)
+    extension.scene_loader.apply_clean_settings(empty, samples=256, osl=False)
+    helpers.sphere_scene(empty, material, size=16, samples=1024)
+    picture = helpers.render(empty)[4:12, 4:12, :3]
+    assert picture.mean() == pytest.approx(1, abs=2e-3)
+    assert np.abs(picture - 1).max() < 0.02
+
+
+def test_nothing_to_coat(extension, empty):
+    material = bpy.data.materials.new("Bare")
+    extension.nodes.empty_tree(material)
+    groups = len(bpy.data.node_groups)
+    with pytest.raises(ValueError, match="Nothing leads to the surface of material 'Bare'"):
+        extension.api.add_coat(material)
+    assert len(bpy.data.node_groups) == groups and not material.node_tree.nodes
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("osl", [True, False])
 def test_curves_look_as_the_data_do(ball, in_blender, two_colored, osl):

@@ -147,6 +147,11 @@ def test_add_albedo(extension, start):
     is_one_step(lambda: bpy.ops.brdfc.add_albedo(node=name))
 
 
+def test_add_coat(extension, start):
+    start("lambert")
+    is_one_step(bpy.ops.brdfc.add_coat)
+
+
 def test_kernel(extension, start):
     start("lossless")
     tree = bpy.context.object.active_material.node_tree

@@ -175,25 +175,25 @@ TEST(Under, IsAllOfTheModelWhereItSaysSo) {
     std::vector<std::string> values;
     bool is_whole;
   };
-  const std::vector<Row> rows{{{}, true},
-                              {{"f0=0.04", "ax=0.01", "ay=0.01"}, true},
-                              {{"f0=1,0.2,0", "ax=0.5", "ay=0.05"}, true},
-                              {{"f0=0", "ax=0.1", "ay=1"}, true},
-                              {{"distribution=beckmann", "f0=0.9,0.6,0.3", "ax=1e-4", "ay=1e-4"}, true},
-                              {{"distribution=beckmann", "ax=0.3", "ay=0.8"}, true},
-                              {{"tint=1,1,0.999"}, false},
-                              {{"ax=0.5", "ay=0.0499"}, false},
-                              {{"distribution=multiscatter_ggx"}, true},
-                              {{"distribution=multiscatter_ggx", "f0=0.04", "again=0.05", "ax=1", "ay=1"}, true},
-                              {{"distribution=multiscatter_ggx", "ax=0.9", "ay=0.9"}, false},
-                              {{"distribution=multiscatter_ggx", "again=0.5,0.4,0.4"}, true},
-                              {{"distribution=multiscatter_ggx", "f0=1,0.8,0.3", "again=1,0.75,0.3"}, true},
-                              {{"distribution=multiscatter_ggx", "f0=1,0.8,0.3", "again=0.9,0.6,0.1", "ax=1", "ay=1"},
-                               true},
-                              {{"distribution=multiscatter_ggx", "f0=0.8,0,0", "again=0.7,0.03,0.03"}, true},
-                              {{"distribution=multiscatter_ggx", "f0=0.1,0.8,0.3", "again=1,0,0"}, false},
-                              {{"masking=smith_separable"}, false},
-                              {{"distribution=beckmann", "masking=v_cavity"}, false}};
+  const std::vector<Row> rows{
+      {{}, true},
+      {{"f0=0.04", "ax=0.01", "ay=0.01"}, true},
+      {{"f0=1,0.2,0", "ax=0.5", "ay=0.05"}, true},
+      {{"f0=0", "ax=0.1", "ay=1"}, true},
+      {{"distribution=beckmann", "f0=0.9,0.6,0.3", "ax=1e-4", "ay=1e-4"}, true},
+      {{"distribution=beckmann", "ax=0.3", "ay=0.8"}, true},
+      {{"tint=1,1,0.999"}, false},
+      {{"ax=0.5", "ay=0.0499"}, false},
+      {{"distribution=multiscatter_ggx"}, true},
+      {{"distribution=multiscatter_ggx", "f0=0.04", "again=0.05", "ax=1", "ay=1"}, true},
+      {{"distribution=multiscatter_ggx", "ax=0.9", "ay=0.9"}, false},
+      {{"distribution=multiscatter_ggx", "again=0.5,0.4,0.4"}, true},
+      {{"distribution=multiscatter_ggx", "f0=1,0.8,0.3", "again=1,0.75,0.3"}, true},
+      {{"distribution=multiscatter_ggx", "f0=1,0.8,0.3", "again=0.9,0.6,0.1", "ax=1", "ay=1"}, true},
+      {{"distribution=multiscatter_ggx", "f0=0.8,0,0", "again=0.7,0.03,0.03"}, true},
+      {{"distribution=multiscatter_ggx", "f0=0.1,0.8,0.3", "again=1,0,0"}, false},
+      {{"masking=smith_separable"}, false},
+      {{"distribution=beckmann", "masking=v_cavity"}, false}};
   const Model& m = find_model("microfacet");
   measure::Random random(15);
   for (const Row& row : rows) {

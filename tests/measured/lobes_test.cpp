@@ -225,8 +225,52 @@ TEST(SumModel, MirrorsAddUpAndLooksAreTheLeastMatte) {
   EXPECT_EQ(SumModel(lobes_of({{"lambert", {}}, {"oren_nayar", {}}})).info().look, Look::Matte);
 }
 
-TEST(SumModel, EightAtOnceAreOneByOne) {
-  const SumModel sum(lobes_of({std::begin(kMixed), std::end(kMixed)}));
+/// Varnish over a matte surface over white.
+const Part kLayers[] = {
+    {"microfacet", {"f0=0.04,0.05,0.06", "ax=0.1", "ay=0.1"}}, {"schlick", {"rough=0.3"}}, {"lambert", {"rho=1"}}};
+
+TEST(Layers, LoseNoLight) {
+  const SumModel layers(lobes_of({kLayers[0], kLayers[2]}), Stack::Layers);
+  const auto brdf = layers.make_double({});
+  for (const double cosine : {1., 0.6, 0.2, 0.05}) {
+    const Rgb<double> a = measure::sampled_albedo(*brdf, cosine, 0.3, "layers", 1 << 15).scattered;
+    EXPECT_NEAR(a.b, 1, 1e-3) << cosine << ": blue, of which the varnish reflects most";
+    EXPECT_LT(a.r, a.b) << cosine;
+  }
+  EXPECT_FALSE(layers.info().properties.reciprocal);
+}
+
+TEST(Layers, PassWhatTheOnesAboveLeave) {
+  const std::vector<Lobe> lobes = lobes_of({std::begin(kLayers), std::end(kLayers)});
+  const auto whole = SumModel(lobes, Stack::Layers).make_double({});
+  for (const double cosine : {0.9, 0.45, 0.1}) {
+    const Vec3<double> wo = direction(cosine, 0.4), wi = direction(0.7, 2.5);
+    Rgb<double> f(0), mirror(0);
+    double passed = 1;
+    for (const Lobe& lobe : lobes) {
+      const auto one = lobe.model->make_double(lobe.values);
+      f += one->eval(wi, wo) * passed;
+      mirror += one->mirror(wo) * passed;
+      passed *= 1 - max_component(measure::albedo(*one, cosine, 0.4).total());
+    }
+    EXPECT_NEAR(whole->eval(wi, wo).g, f.g, 1e-3 * f.g) << cosine;
+    EXPECT_NEAR(whole->mirror(wo).g, mirror.g, 1e-3 * mirror.g) << cosine;
+  }
+}
+
+TEST(Layers, SamplesFollowThePdf) {
+  const SumModel layers(lobes_of({kLayers[0], kLayers[2]}), Stack::Layers);
+  const check::ChiSquare c = check::chi_square(bound(layers), direction(0.5, 0.9), 20000, 1);
+  EXPECT_TRUE(c.converged);
+  EXPECT_GT(c.degrees, 20);
+  EXPECT_GT(c.p, 1e-3);
+}
+
+class Stacks : public testing::TestWithParam<Stack> {};
+INSTANTIATE_TEST_SUITE_P(All, Stacks, testing::Values(Stack::Sum, Stack::Layers));
+
+TEST_P(Stacks, EightAtOnceAreOneByOne) {
+  const SumModel sum(lobes_of({std::begin(kMixed), std::end(kMixed)}), GetParam());
   const auto packed = sum.make_packed({});
   const auto one = sum.make_double({});
   measure::Random random(9);

@@ -447,6 +447,8 @@ TEST_F(SceneTest, SchemaListsTheKeysOfTheLoader) {
       {"material", "/materials/red", nullptr},
       {"measured_material", "/materials/red", {{"measured", "a.binary"}}},
       {"sum_material", "/materials/red", {{"sum", json::array({{{"model", "lambert"}}})}}},
+      {"layers_material", "/materials/red", {{"layers", json::array({{{"model", "lambert"}}})}}},
+      {"lobe", "/materials/mixed/layers/0", {{"model", "lambert"}}},
       {"textured", "/materials/red/parameters/rho", {{"texture", checker}}},
       {"image_texture", "/materials/red/parameters/rho/texture", {{"image", "a.png"}}},
       {"checker_texture", "/materials/red/parameters/rho/texture", checker},
