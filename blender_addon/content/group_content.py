@@ -156,13 +156,8 @@ def fill_with_nodes(group, form, source, twin_group, room=lamps.WHOLE):
             room.cones,
             label,
         )
-        instead = None
-        if twin_group is not None:
-            sources = parameters | {pack.NORMAL: normal, pack.TANGENT: tangent}
-            instead = _instance(group, twin_group, sources)
-        elif stand_in.has_node(form.model) and "baked" not in group[TAG]:
-            instead = stand_in.node_of(group, form, parameters)
-        if instead is not None:
+        sources = parameters | {pack.NORMAL: normal, pack.TANGENT: tangent}
+        if instead := _stand_in(group, form, twin_group, sources):
             made = stand_in.add_in_eevee(group, made, instead)
     if not is_twin:
         _add_outputs(group, made)
@@ -171,6 +166,17 @@ def fill_with_nodes(group, form, source, twin_group, room=lamps.WHOLE):
         group.links.new(output, group_output.inputs[name])
     group_output.location = (200 + max(n.location.x for n in group.nodes), 0)
     group[TAG]["sockets"] = interface.identifiers()
+
+
+def _stand_in(group, form, twin_group, sources):
+    """Outputs by name of what stands in for a form, if anything does. A model that has a node of
+    Blender's takes only the albedo from its twin."""
+    made = {}
+    if twin_group is not None:
+        made = _instance(group, twin_group, sources)
+    if stand_in.has_node(form.model) and "baked" not in group[TAG]:
+        made |= stand_in.node_of(group, form, sources)
+    return made
 
 
 def _relays(group, interface, parameters, without=()):
@@ -298,12 +304,7 @@ def fill_with_scripts(group, form, texts, twin_group):
         for name in lamp_inputs:
             group.links.new(shared.outputs[name], inputs[name])
     sources = {name: s.links[0].from_socket for name, s in inputs.items() if s.is_linked}
-    instead = None
-    if twin_group is not None:
-        instead = _instance(group, twin_group, sources)
-    elif stand_in.has_node(form.model) and "baked" not in tag:
-        instead = stand_in.node_of(group, form, sources)
-    if instead is not None:
+    if instead := _stand_in(group, form, twin_group, sources):
         tag["stands_in"] = True
         runs = _add_script(group, stand_in.text(), "what tells where shaders run")
         for name, output in stand_in.add(group, runs, from_scripts, instead).items():

@@ -1,13 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Replaces a shader where Open Shading Language does not run: by the model's twin or, for glass and
-ideal mirrors, by the nearest of Blender's nodes.
+"""Replaces a shader where Open Shading Language does not run, and Formula Nodes in EEVEE: by the
+model's twin or by the nearest of Blender's nodes.
 
 In EEVEE, and in Cycles on devices or with settings without OSL, the outputs of a script node are 0.
 So the output of a script that sets it to 1 tells whether shaders run, and selects one of the two.
 OSL folds this constant before rendering, so the stand-in takes no time there.
 """
 
+import math
+
 import bpy
+
+from ..packs import pack
+from . import width_albedo
+from .wiring import Wiring
 
 #: Name of that script node, and of its output.
 NODE = "Runs"
@@ -59,21 +65,101 @@ def keep_one_text():
         found[0].name = _FILE
 
 
-#: Blender's nodes for models without a twin, which scatter nothing or let light through: the kind,
-#: and the parameter for each socket; that of Roughness is its square.
+def _glass(w, given, normal):
+    """Blender's Glass node; its colour tints what is reflected as well, which is little beside what
+    is refracted."""
+    node = w.node("ShaderNodeBsdfGlass", distribution="GGX")  # light that is reflected once
+    w.give(node.inputs["IOR"], given("ior"))
+    w.give(node.inputs["Color"], given("refracted") if given.has("refracted") else (1.0,) * 4)
+    roughness = w.math("SQRT", given("alpha")) if given.has("alpha") else 0.0
+    w.give(node.inputs["Roughness"], roughness)
+    w.give(node.inputs["Normal"], normal)
+    return node.outputs["BSDF"]
+
+
+def _polished_metal(w, given, normal):
+    node = w.node("ShaderNodeBsdfMetallic", fresnel_type="PHYSICAL_CONDUCTOR")
+    w.give(node.inputs["Roughness"], 0.0)
+    w.give(node.inputs["Normal"], normal)
+    for socket, parts in {"IOR": "n", "Extinction": "k"}.items():
+        w.give(node.inputs[socket], w.combine(*(given(f"{parts}_{c}") for c in "rgb")))
+    return node.outputs["BSDF"]
+
+
+def _metal(w, given, normal):
+    """EEVEE has no anisotropy: the roughness is the mean of both."""
+    roughness = w.math("SQRT", w.mean(given("ax"), given("ay")))
+    return w.metal("ggx", given("f0"), given("tint"), roughness, 0.0, 0.0, normal, None)
+
+
+def _ward(w, given, normal):
+    roughness = w.math("SQRT", w.mean(given("ax"), given("ay")))
+    return w.bsdf("beckmann", given("ks"), normal, roughness)
+
+
+def _ashikhmin_shirley(w, given, normal):
+    """A power of the half vector's cosine is as wide as facets with alpha^2 = 2 / (n + 2)."""
+    alpha2 = w.math("DIVIDE", 2.0, w.math("ADD", w.mean(given("nu"), given("nv")), 2.0))
+    roughness, white = w.math("POWER", alpha2, 0.25), (1.0, 1.0, 1.0)
+    metal = w.metal("beckmann", given("rs"), (*white, 1.0), roughness, 0.0, 0.0, normal, None)
+    matte = w.vector("MULTIPLY", given("rd"), w.vector("SUBTRACT", white, given("rs")))
+    diffuse = w.bsdf("diffuse", matte, normal)
+    terms = {"diffuse": metal, "specular": diffuse}  # the part that lacks each
+    return w.sum([w.shown(given.is_not("part", part), term) for part, term in terms.items()])
+
+
+def _phong_material(w, given, normal):
+    """See power_facets_under() of generator/model/under.h for how wide the facets are."""
+
+    def glossy(color, exponent):
+        roughness = w.math("POWER", w.math("DIVIDE", 0.5, w.math("ADD", exponent, 1.0)), 0.25)
+        return w.bsdf("beckmann", color, normal, roughness)
+
+    # A highlight has no factor that keeps its light the same at all widths.
+    light = w.math("DIVIDE", 2 * math.pi, w.math("ADD", given("es"), 2.0))
+    highlight = w.scaled(given("cs"), w.math("MULTIPLY", given("ks"), light))
+    matte = w.bsdf("diffuse", w.scaled(given("cd"), given("kd")), normal)
+    reflection = glossy(w.scaled(given("cr"), given("kr")), given("e"))
+    return w.sum([matte, glossy(highlight, given("es")), reflection])
+
+
+#: Blender's nodes by model: for glass and ideal mirrors, which have no twin, and for models with
+#: two widths, whose twins have those of the defaults.
 _NODES = {
-    "glass": ("ShaderNodeBsdfGlass", {"IOR": "ior"}),
-    # Its colour tints what is reflected as well, which is little beside what is refracted.
-    "fresnel_dielectric": ("ShaderNodeBsdfGlass", {"IOR": "ior", "Color": "refracted"}),
-    "rough_glass": (
-        "ShaderNodeBsdfGlass",
-        {"IOR": "ior", "Color": "refracted", "Roughness": "alpha"},
-    ),
-    "fresnel_conductor": (
-        "ShaderNodeBsdfMetallic",
-        {"IOR": ("n_r", "n_g", "n_b"), "Extinction": ("k_r", "k_g", "k_b")},
-    ),
+    "glass": _glass,
+    "fresnel_dielectric": _glass,
+    "rough_glass": _glass,
+    "fresnel_conductor": _polished_metal,
+    "microfacet": _metal,
+    "ward": _ward,
+    "ashikhmin_shirley": _ashikhmin_shirley,
+    "phong_material": _phong_material,
 }
+
+
+class _Given:
+    """Values of a form's parameters: outputs, or constants."""
+
+    def __init__(self, w, form, sources):
+        self._w, self._form, self._sources = w, form, sources
+
+    def has(self, name):
+        return name in self._sources or name in self._form.constants
+
+    def __call__(self, name):
+        if name in self._sources:
+            return self._sources[name]
+        value = self._form.constants[name]
+        return (*value, 1.0) if isinstance(value, (tuple, list)) else value
+
+    def is_not(self, name, choice):
+        """1 unless a choice is this one, otherwise 0."""
+        if name not in self._sources:
+            return float(self._form.constants[name] != choice)
+        index = self._form.model.parameters[name]["choices"].index(choice)
+        return self._w.math(
+            "SUBTRACT", 1.0, self._w.math("COMPARE", self._sources[name], index, 0.25)
+        )
 
 
 def has_node(model):
@@ -81,39 +167,17 @@ def has_node(model):
     return model.name in _NODES
 
 
-def node_of(group, form, parameters):
-    """The outputs, by name, of the node that stands in for a form. `parameters`: outputs by
-    name."""
-    kind, given = _NODES[form.model.name]
-    node = group.nodes.new(kind)
-    if kind == "ShaderNodeBsdfMetallic":
-        node.fresnel_type = "PHYSICAL_CONDUCTOR"
-    else:
-        node.distribution = "GGX"  # light that is reflected once
-    node.inputs["Roughness"].default_value = 0.0
-
-    def give(socket, name):
-        if name in parameters:
-            group.links.new(parameters[name], socket)
-        else:
-            value = form.constants[name]
-            socket.default_value = (*value, 1.0) if isinstance(value, (tuple, list)) else value
-
-    for name, source in given.items():
-        if name == "Roughness":
-            root = group.nodes.new("ShaderNodeMath")
-            root.operation = "SQRT"
-            give(root.inputs[0], source)
-            group.links.new(root.outputs[0], node.inputs[name])
-            continue
-        if isinstance(source, str):
-            give(node.inputs[name], source)
-            continue
-        vector = group.nodes.new("ShaderNodeCombineXYZ")
-        for part, socket in zip(source, vector.inputs, strict=True):
-            give(socket, part)
-        group.links.new(vector.outputs[0], node.inputs[name])
-    return {"BSDF": node.outputs["BSDF"]}
+def node_of(group, form, sources):
+    """The outputs, by name, of the nodes that stand in for a form. `sources`: outputs by
+    parameter, and of the normal, which is 0 where the surface's own is meant."""
+    w, model = Wiring(group), form.model
+    given, normal = _Given(w, form, sources), w.bent_or_own(sources[pack.NORMAL])
+    made = {"BSDF": _NODES[model.name](w, given, normal)}
+    if model.name in width_albedo.WIDTHS and model.has_albedo:
+        viewer = w.node("ShaderNodeNewGeometry").outputs["Incoming"]
+        cos_theta = w.vector("DOT_PRODUCT", normal, viewer, output="Value")
+        made["Albedo"] = width_albedo.wire(w, model, given, cos_theta)
+    return made
 
 
 def twin_of(group, twin, inputs):

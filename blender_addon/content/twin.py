@@ -17,20 +17,21 @@ from .wiring import DISTRIBUTIONS, Wiring
 class _Curves:
     """Tables with a single row, over the view angle: a curve node each."""
 
-    def __init__(self, wiring, data, cos_theta, place, name):
+    def __init__(self, wiring, cos_theta):
         self.wiring, self.cos_theta = wiring, cos_theta
 
     def look_up(self, rows):
         return self.wiring.curve(self.cos_theta, rows[0])
 
 
-class _Picture:
+class Picture:
     """Tables with several rows: a data image with the rows above one another and red, green and
     blue side by side, which every engine interpolates linearly between pixels."""
 
-    def __init__(self, wiring, data, cos_theta, place, name):
+    def __init__(self, wiring, tables, cos_theta, place, name):
+        """`place`: output with the position between the first row and the last, from 0 to 1.
+        `name`: of the image."""
         self.wiring = wiring
-        tables = list(_tables(data))
         count, width = len(tables[0]), len(tables[0][0])
         height = count * math.ceil(len(tables) / 3)
         pixels = np.ones((height, width, 4), np.float32)
@@ -75,7 +76,7 @@ def _tables(data):
         yield from channels
 
 
-def _place(w, axis, value):
+def place_on_axis(w, axis, value):
     """Position of a number on its slider, from 0 to 1 on the slider's scale."""
     scale = {
         "linear": lambda x: x,
@@ -136,15 +137,15 @@ def wire(tree, data, normal, parameters, name):
     axis, mixed = data["axis"], [parameters[n] for n in data["mixed"]]
     known = [*data["mixed"], *([axis["parameter"]] if axis else [])]
     factors = [output for n, output in parameters.items() if n not in known]
-    geometry = w.node("ShaderNodeNewGeometry")
-    viewer = geometry.outputs["Incoming"]
-    missing = w.math("LESS_THAN", w.vector("LENGTH", normal, output="Value"), 0.5)
-    own = w.vector("SCALE", geometry.outputs["Normal"], scale=missing)
-    normal = w.vector("NORMALIZE", w.vector("ADD", normal, own))
+    normal = w.bent_or_own(normal)
+    viewer = w.node("ShaderNodeNewGeometry").outputs["Incoming"]
     cos_theta = w.vector("DOT_PRODUCT", normal, viewer, output="Value")
     across = w.vector("CROSS_PRODUCT", normal, viewer)
-    place = _place(w, axis, parameters[axis["parameter"]]) if axis else None
-    tables = (_Picture if axis else _Curves)(w, data, cos_theta, place, name)
+    place = place_on_axis(w, axis, parameters[axis["parameter"]]) if axis else None
+    if axis:
+        tables = Picture(w, list(_tables(data)), cos_theta, place, name)
+    else:
+        tables = _Curves(w, cos_theta)
     looked = _Looked(w, tables)
     tint = tuple(data["tint"])
     for factor in factors:

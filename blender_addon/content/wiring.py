@@ -49,6 +49,12 @@ class Wiring:
             self.give(socket, value)
         return node.outputs["Value"]
 
+    def mean(self, *values):
+        """The geometric mean of one or two numbers."""
+        if len(values) == 1:
+            return values[0]
+        return self.math("SQRT", self.math("MULTIPLY", *values))
+
     def vector(self, operation, *values, scale=None, output="Vector"):
         node = self.node("ShaderNodeVectorMath", operation=operation)
         for socket, value in zip(node.inputs, values, strict=False):
@@ -88,6 +94,13 @@ class Wiring:
             self.give(node.inputs["Tangent"], stretched[1])
         return node.outputs["BSDF"]
 
+    def bent_or_own(self, normal):
+        """`normal`, or the surface's own where that is 0."""
+        own = self.node("ShaderNodeNewGeometry").outputs["Normal"]
+        missing = self.math("LESS_THAN", self.vector("LENGTH", normal, output="Value"), 0.5)
+        own = self.vector("SCALE", own, scale=missing)
+        return self.vector("NORMALIZE", self.vector("ADD", normal, own))
+
     def metal(self, kind, f0, edge, roughness, anisotropy, rotation, normal, tangent):
         node = self.node(
             "ShaderNodeBsdfMetallic", fresnel_type="F82", distribution=DISTRIBUTIONS[kind]
@@ -98,7 +111,8 @@ class Wiring:
         self.give(node.inputs["Anisotropy"], anisotropy)
         self.give(node.inputs["Rotation"], rotation)
         self.give(node.inputs["Normal"], normal)
-        self.give(node.inputs["Tangent"], tangent)
+        if tangent is not None:
+            self.give(node.inputs["Tangent"], tangent)
         return node.outputs["BSDF"]
 
     def sum(self, shaders):

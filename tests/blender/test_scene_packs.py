@@ -172,7 +172,7 @@ def stands_in(node):
     found = {}
     for inner in node.node_tree.nodes:
         if inner.bl_idname in ("ShaderNodeBsdfGlass", "ShaderNodeBsdfMetallic"):
-            for socket in inner.inputs:
+            for socket in filter(lambda s: s.enabled, inner.inputs):
                 if socket.is_linked and socket.links[0].from_node.type == "COMBXYZ":
                     parts = socket.links[0].from_node.inputs
                     found[socket.name] = [None if p.is_linked else p.default_value for p in parts]

@@ -134,6 +134,49 @@ def test_a_twin_stands_in_where_shaders_do_not_run(extension, balls):
     assert np.abs(shader - stood_in).max() > 0.01 and stood_in.mean() > 0.02
 
 
+#: Models with two widths, of which each is narrow in one material and wide in another.
+TWO_WIDTHS = {
+    "microfacet": ({"ax": 0.03, "ay": 0.03}, {"ax": 0.5, "ay": 0.5, "tint": (0.5, 0.8, 1.0)}),
+    "ward": ({"ax": 0.05, "ay": 0.05}, {"ax": 0.4, "ay": 0.4}),
+    "ashikhmin_shirley": (
+        {"nu": 500.0, "nv": 500.0, "rd": (0.5, 0.1, 0.1)},
+        {"nu": 10.0, "nv": 10.0, "rs": 0.5, "part": "specular"},
+    ),
+    "phong_material": ({"e": 400.0, "es": 100.0}, {"e": 20.0, "es": 4.0}),
+}
+
+
+@pytest.mark.parametrize("model", TWO_WIDTHS)
+def test_both_widths_show_where_shaders_do_not_run(extension, balls, model):
+    """Blender's nodes in their place, as in EEVEE, are like the model at every width."""
+    for values in TWO_WIDTHS[model]:
+        stood_in, formulas = (
+            balls([extension.api.new_material(model, form, **values)], osl=False)
+            for form in ("sampled", "nodes")
+        )
+        like = np.corrcoef(stood_in.ravel(), formulas.ravel())[0, 1]
+        print(f"{values}: {stood_in.mean() / formulas.mean():.3f} times as bright, {like:.4f}")
+        assert stood_in.mean() == pytest.approx(formulas.mean(), rel=0.15)
+        assert like > 0.96
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("model", TWO_WIDTHS)
+def test_both_widths_show_in_eevee(extension, balls, model, tmp_path):
+    narrow, wide = (extension.api.new_material(model, **v) for v in TWO_WIDTHS[model])
+    expected = balls([narrow, wide], osl=False)
+    scene = bpy.context.scene
+    scene.render.engine = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0, 0) else "BLENDER_EEVEE"
+    scene.eevee.taa_render_samples = 16
+    scene.render.filepath = str(tmp_path / "eevee.exr")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "eevee.blend"))
+    if missing := eevee.picture_of(tmp_path / "eevee.blend", scene.render.filepath):
+        pytest.skip(missing)
+    shown = read_picture(tmp_path / "eevee.exr")[..., :3]
+    for part in (np.s_[:, :32], np.s_[:, 32:64]):
+        assert np.corrcoef(expected[part].ravel(), shown[part].ravel())[0, 1] > 0.9
+
+
 def test_what_is_linked_reaches_the_twin_too(extension, balls):
     def bumpy(form):
         material = extension.api.new_material("phong", form)
