@@ -45,7 +45,7 @@ constexpr const char* kOslWords = R"(
 /// Prefixes of numbered names.
 constexpr const char* kNumbered =
     "albedo alpha alpha_across exponent ior knots normal position ramp roughness size smooth table table_b table_g "
-    "table_r tangent u v weight whole_across whole_alpha whole_f0 whole_stands";
+    "table_r tangent u v weight whole_across whole_alpha whole_f0 whole_weight";
 
 std::set<std::string> split(const char* text) {
   std::istringstream in(text);
