@@ -149,8 +149,7 @@ class _Given:
     def __call__(self, name):
         if name in self._sources:
             return self._sources[name]
-        value = self._form.constants[name]
-        return (*value, 1.0) if isinstance(value, (tuple, list)) else value
+        return self._form.constants[name]
 
     def is_not(self, name, choice):
         """1 unless a choice is this one, otherwise 0."""

@@ -38,6 +38,8 @@ class Wiring:
         if hasattr(value, "is_output"):
             self.tree.links.new(value, socket)
             return
+        if socket.type == "RGBA" and len(value) == 3:
+            value = (*value, 1.0)
         found = socket.default_value
         same = tuple(found) == tuple(value) if hasattr(found, "__len__") else found == value
         if not same:
