@@ -102,12 +102,13 @@ def models():
 
 
 def _checked(model_name, representation, given):
-    """Returns the form to use and the parameter values in canonical form."""
+    """Returns the form to use, or "auto", and the parameter values in canonical form."""
     given = dict(given)
     model = pack.model(model_name)
     checked = {name: model.check_value(name, v) for name, v in given.items()}
     values = {name: v for name, v in checked.items() if name not in model.fixed}
-    return model.resolve(representation, values).name, values
+    form = model.resolve(representation, values).name
+    return "auto" if representation == "auto" else form, values
 
 
 def prepare_material(material):
@@ -131,14 +132,11 @@ def new_material(model, representation="auto", **parameters):
     the file.
     """
     form, values = _checked(model, representation, parameters)
-    representation = "auto" if representation == "auto" else form
-    nodes.ensure_group(model, representation, values=values)
+    nodes.ensure_group(model, form, values=values)
     material = bpy.data.materials.new(pack.model(model).label)
     try:
         tree = nodes.empty_tree(material)
-        node = nodes.add_group_node(tree, model, representation, values)
-        for name, value in values.items():
-            model_nodes.set_value(node, name, value)
+        node = _add_model(tree, model, form, values)
         output = tree.nodes.new("ShaderNodeOutputMaterial")
         output.location = (300, 0)
         tree.links.new(node.outputs["BSDF"], output.inputs["Surface"])
@@ -183,7 +181,7 @@ def new_measured_material(found, model=None, representation="auto"):
     material = new_material(fit.model, representation, **fit.parameters)
     material.name = found.path.stem
     if fit.matte:
-        measured.add_matte(material.node_tree, _the_node(material), fit.matte)
+        stacks.add_matte(material.node_tree, _the_node(material), fit.matte)
     return material
 
 
@@ -220,7 +218,7 @@ def new_sum(lobes, representation="auto", name="Sum"):
     `[("lambert", {"rho": (0.2, 0.1, 0.1)}), ("ward", {})]`, or those of a fitted sum. Raises
     ValueError, and what new_material() raises; after an error nothing is left in the file.
     """
-    return _new_stack(lobes, representation, name, _add_up)
+    return _new_stack(lobes, representation, name, stacks.add_shaders)
 
 
 def new_layers(layers, representation="auto", name="Layers"):
@@ -231,7 +229,7 @@ def new_layers(layers, representation="auto", name="Layers"):
     is not attenuated by its own direction, so the material is not reciprocal. `layers` is as for
     new_sum(), which says what is raised.
     """
-    return _new_stack(layers, representation, name, _put_over)
+    return _new_stack(layers, representation, name, stacks.put_layers)
 
 
 def add_coat(material, model="microfacet", representation="auto", **parameters):
@@ -245,14 +243,12 @@ def add_coat(material, model="microfacet", representation="auto", **parameters):
     editable.check(argument_checks.material(material))
     if model == "microfacet":
         parameters = _VARNISH | parameters
-    (pair,) = measured.as_pairs([(model, parameters)])
-    form, values = _checked(model, representation, pair[1])
-    below, target = stacks.surface_of(material)
-    coat = _add_model(
-        material.node_tree, model, "auto" if representation == "auto" else form, values
-    )
+    measured.as_pairs([(model, parameters)])  # refuses models that let light through
+    form, values = _checked(model, representation, parameters)
+    surface = stacks.surface_of(material)
+    coat = _add_model(material.node_tree, model, form, values)
     try:
-        stacks.put_over(coat, below, target)
+        stacks.add_coat(coat, surface)
     except BaseException:
         material.node_tree.nodes.remove(coat)
         raise
@@ -274,32 +270,14 @@ def _new_stack(lobes, representation, name, put_together):
     material = new_material(first, representation, **values)
     try:
         tree, node = material.node_tree, _the_node(material)
-        added = []
-        for model, form, values in checked:
-            form = "auto" if representation == "auto" else form
-            added.append(_add_model(tree, model, form, values))
-        put_together(tree, [node, *added])
+        added = [_add_model(tree, *model_form_values) for model_form_values in checked]
+        put_together(tree, node, added)
         prepare_material(material)
     except BaseException:
         bpy.data.materials.remove(material)
         raise
     material.name = name
     return material
-
-
-def _add_up(tree, lobes):
-    stacks.add_shaders(tree, lobes[0], lobes[1:])
-
-
-def _put_over(tree, layers):
-    """From the lowest upwards."""
-    target = shader_trees.surface_link(tree).to_socket
-    below = layers[-1].outputs["BSDF"]
-    layers[-1].location.y -= 300 * (len(layers) - 1)
-    tree.links.new(below, target)
-    for layer in reversed(layers[:-1]):
-        stacks.put_over(layer, below, target)
-        below = target.links[0].from_socket
 
 
 def _the_node(material, node=None):

@@ -12,7 +12,6 @@ import bpy
 
 from .common.i18n import say
 from .common.program import ToolJob
-from .groups import stacks
 from .packs import pack
 
 #: What stands for the sum of lobes where a model is asked for.
@@ -205,12 +204,3 @@ def as_pairs(lobes):
                 say("{model!r} lets light through: expected models that reflect", model=model)
             )
     return pairs
-
-
-def add_matte(tree, node, albedo):
-    """Adds the light of a Lambert surface to that of a model's node: Blender's Diffuse node with a
-    roughness of 0."""
-    diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
-    diffuse.inputs["Color"].default_value = (*albedo, 1.0)
-    diffuse.inputs["Roughness"].default_value = 0.0
-    stacks.add_shaders(tree, node, [diffuse])

@@ -169,11 +169,9 @@ def fill_with_nodes(group, form, source, twin_group, room=lamps.WHOLE):
 
 
 def _stand_in(group, form, twin_group, sources):
-    """Outputs by name of what stands in for a form, if anything does. A model that has a node of
-    Blender's takes only the albedo from its twin."""
-    made = {}
-    if twin_group is not None:
-        made = _instance(group, twin_group, sources)
+    """Outputs by name of what stands in for a form, if anything does: of the twin those that no
+    node of Blender's has."""
+    made = _instance(group, twin_group, sources) if twin_group is not None else {}
     if stand_in.has_node(form.model) and "baked" not in group[TAG]:
         made |= stand_in.node_of(group, form, sources)
     return made

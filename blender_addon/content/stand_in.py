@@ -70,7 +70,7 @@ def _glass(w, given, normal):
     is refracted."""
     node = w.node("ShaderNodeBsdfGlass", distribution="GGX")  # light that is reflected once
     w.give(node.inputs["IOR"], given("ior"))
-    w.give(node.inputs["Color"], given("refracted") if given.has("refracted") else (1.0,) * 4)
+    w.give(node.inputs["Color"], given("refracted") if given.has("refracted") else (1.0,) * 3)
     roughness = w.math("SQRT", given("alpha")) if given.has("alpha") else 0.0
     w.give(node.inputs["Roughness"], roughness)
     w.give(node.inputs["Normal"], normal)
@@ -89,7 +89,7 @@ def _polished_metal(w, given, normal):
 def _metal(w, given, normal):
     """EEVEE has no anisotropy: the roughness is the mean of both."""
     roughness = w.math("SQRT", w.mean(given("ax"), given("ay")))
-    return w.metal("ggx", given("f0"), given("tint"), roughness, 0.0, 0.0, normal, None)
+    return w.metal("ggx", given("f0"), given("tint"), roughness, normal)
 
 
 def _ward(w, given, normal):
@@ -101,7 +101,7 @@ def _ashikhmin_shirley(w, given, normal):
     """A power of the half vector's cosine is as wide as facets with alpha^2 = 2 / (n + 2)."""
     alpha2 = w.math("DIVIDE", 2.0, w.math("ADD", w.mean(given("nu"), given("nv")), 2.0))
     roughness, white = w.math("POWER", alpha2, 0.25), (1.0, 1.0, 1.0)
-    metal = w.metal("beckmann", given("rs"), (*white, 1.0), roughness, 0.0, 0.0, normal, None)
+    metal = w.metal("beckmann", given("rs"), white, roughness, normal)
     matte = w.vector("MULTIPLY", given("rd"), w.vector("SUBTRACT", white, given("rs")))
     diffuse = w.bsdf("diffuse", matte, normal)
     terms = {"diffuse": metal, "specular": diffuse}  # the part that lacks each
@@ -166,13 +166,19 @@ def has_node(model):
     return model.name in _NODES
 
 
+def needs_no_twin(model):
+    """Whether nodes of Blender stand in for a model with its albedo, so that its twin is not
+    used."""
+    return model.name in width_albedo.WIDTHS and model.has_albedo
+
+
 def node_of(group, form, sources):
     """The outputs, by name, of the nodes that stand in for a form. `sources`: outputs by
     parameter, and of the normal, which is 0 where the surface's own is meant."""
     w, model = Wiring(group), form.model
     given, normal = _Given(w, form, sources), w.bent_or_own(sources[pack.NORMAL])
     made = {"BSDF": _NODES[model.name](w, given, normal)}
-    if model.name in width_albedo.WIDTHS and model.has_albedo:
+    if needs_no_twin(model):
         viewer = w.node("ShaderNodeNewGeometry").outputs["Incoming"]
         cos_theta = w.vector("DOT_PRODUCT", normal, viewer, output="Value")
         made["Albedo"] = width_albedo.wire(w, model, given, cos_theta)

@@ -4,6 +4,7 @@ tables follow one parameter at most."""
 
 import numpy as np
 
+from ..packs import energy
 from .twin import Picture, place_on_axis
 
 #: The widths by model.
@@ -31,7 +32,8 @@ def wire(w, model, given, cos_theta):
         ends = (_SCALES[axis["scale"]](axis[end]) for end in ("low", "high"))
         widths = _INVERSE[axis["scale"]](np.linspace(*ends, _ROWS))
         place = place_on_axis(w, axis, w.mean(*map(given, varying)))
-    terms = table["terms"][_default_combination(table, model.parameters)]
+    defaults = {name: p["default"] for name, p in model.parameters.items()}
+    terms = table["terms"][energy.combination(table, model.parameters, defaults)]
     rows = [_rows(table["grids"][term["grid"]], widths) for term in terms]
     picture = Picture(w, rows, cos_theta, place, f"{model.label} (albedo)")
     total = None
@@ -42,15 +44,6 @@ def wire(w, model, given, cos_theta):
         part = w.vector("SCALE", colour, scale=picture.look_up(table_of_term))
         total = part if total is None else w.vector("ADD", total, part)
     return total
-
-
-def _default_combination(table, schema):
-    """As energy.albedo() counts combinations of choices."""
-    index = 0
-    for name in table["choices"]:
-        choices = schema[name]["choices"]
-        index = index * len(choices) + choices.index(schema[name]["default"])
-    return index
 
 
 def _rows(grid, widths):

@@ -103,7 +103,7 @@ class Wiring:
         own = self.vector("SCALE", own, scale=missing)
         return self.vector("NORMALIZE", self.vector("ADD", normal, own))
 
-    def metal(self, kind, f0, edge, roughness, anisotropy, rotation, normal, tangent):
+    def metal(self, kind, f0, edge, roughness, normal, anisotropy=0.0, rotation=0.0, tangent=None):
         node = self.node(
             "ShaderNodeBsdfMetallic", fresnel_type="F82", distribution=DISTRIBUTIONS[kind]
         )

@@ -5,6 +5,7 @@ import bpy
 
 from ..common.i18n import say
 from ..content.group_content import ALBEDO
+from ..content.wiring import Wiring
 from ..trees import shader_trees
 from . import nodes
 
@@ -30,13 +31,39 @@ def add_shaders(tree, node, others):
         tree.links.new(sum_so_far, target)
 
 
-def put_over(layer, below, target):
-    """Puts a model's node over a shader: what lies below gets the light that the layer leaves, 1
-    minus the largest channel of its albedo for the view, as in the Principled node.
+def add_matte(tree, node, albedo):
+    """Adds the light of a Lambert surface to that of a model's node: Blender's Diffuse node with a
+    roughness of 0."""
+    diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    diffuse.inputs["Color"].default_value = (*albedo, 1.0)
+    diffuse.inputs["Roughness"].default_value = 0.0
+    add_shaders(tree, node, [diffuse])
 
-    `below`: the output that leads to `target`, which gets both together. Raises what
-    nodes.add_albedo() raises.
-    """
+
+def put_layers(tree, top, others):
+    """Puts a model's node over others, each of which lies over the next. Links of the node's BSDF
+    lead to all together afterwards. Raises what nodes.add_albedo() raises."""
+    *uppers, lowest = layers = [top, *others]
+    targets = [link.to_socket for link in top.outputs["BSDF"].links]
+    below = lowest.outputs["BSDF"]
+    lowest.location.y -= 300 * (len(layers) - 1)
+    for layer in reversed(uppers):
+        below = _put_over(layer, below)
+    for target in targets:
+        _lead_to(below, target)
+
+
+def add_coat(coat, surface):
+    """Puts a model's node over the shader that a link leads to a surface. Raises what
+    nodes.add_albedo() raises."""
+    target = surface.to_socket
+    _lead_to(_put_over(coat, surface.from_socket), target)
+
+
+def _put_over(layer, below):
+    """The output of a node that puts a model's node over the shader of an output: what lies below
+    gets the light that the layer leaves, 1 minus the largest channel of its albedo for the view, as
+    in the Principled node."""
     nodes.add_albedo(layer)
     tree = layer.id_data
     x, y = below.node.location
@@ -44,23 +71,27 @@ def put_over(layer, below, target):
     both.node_tree, both.label = _layer_over(), "Layer Over"
     layer.location = (x, y + 300)
     both.location = (x + max(layer.width, below.node.width) + 60, y + 100)
-    target.node.location.x = max(target.node.location.x, both.location.x + 200)
     tree.links.new(layer.outputs["BSDF"], both.inputs["Layer"])
     tree.links.new(layer.outputs[ALBEDO], both.inputs[ALBEDO])
     tree.links.new(below, both.inputs["Below"])
-    tree.links.new(both.outputs[0], target)
+    return both.outputs[0]
+
+
+def _lead_to(output, target):
+    """Links an output to a socket of a node that stands to the right of it."""
+    target.node.location.x = max(target.node.location.x, output.node.location.x + 200)
+    output.id_data.links.new(output, target)
 
 
 def surface_of(material):
-    """The output that Cycles shows as a material's surface, and the socket it leads to. Raises
-    ValueError without one."""
+    """The link to the surface of a material that Cycles shows. Raises ValueError without one."""
     tree = shader_trees.shading(material)
     link = shader_trees.surface_link(tree) if tree is not None else None
     if link is None:
         raise ValueError(
             say("Nothing leads to the surface of material {material!r}", material=material.name)
         )
-    return link.from_socket, link.to_socket
+    return link
 
 
 def _layer_over():
@@ -73,23 +104,11 @@ def _layer_over():
     for name, kind in (("Layer", "Shader"), (ALBEDO, "Color"), ("Below", "Shader")):
         group.interface.new_socket(name, in_out="INPUT", socket_type=f"NodeSocket{kind}")
     group.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
-    kinds = ("SeparateColor", "Math", "Math", "MixShader", "AddShader")
-    split, larger, largest, left, both = (group.nodes.new(f"ShaderNode{kind}") for kind in kinds)
-    start, end = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
-    larger.operation = largest.operation = "MAXIMUM"
-    for index, node in enumerate((start, split, larger, largest, left, both, end)):
-        node.location = (200 * index, 0)
-    for output, socket in (
-        (start.outputs[ALBEDO], split.inputs[0]),
-        (split.outputs[0], larger.inputs[0]),
-        (split.outputs[1], larger.inputs[1]),
-        (larger.outputs[0], largest.inputs[0]),
-        (split.outputs[2], largest.inputs[1]),
-        (largest.outputs[0], left.inputs["Fac"]),
-        (start.outputs["Below"], left.inputs[1]),
-        (start.outputs["Layer"], both.inputs[0]),
-        (left.outputs[0], both.inputs[1]),
-        (both.outputs[0], end.inputs[0]),
-    ):
-        group.links.new(output, socket)
+    w = Wiring(group)
+    start, end = w.node("NodeGroupInput"), w.node("NodeGroupOutput")
+    red, green, blue = w.separate(start.outputs[ALBEDO])
+    largest = w.math("MAXIMUM", w.math("MAXIMUM", red, green), blue)
+    left = w.shown(w.math("SUBTRACT", 1.0, largest), start.outputs["Below"])
+    w.give(end.inputs[0], w.sum([start.outputs["Layer"], left]))
+    w.place_nodes()
     return group

@@ -40,7 +40,7 @@ def _interpolate(grid, coordinates):
     return value * 3 if channels == 1 else value
 
 
-def _combination(table, schema, values):
+def combination(table, schema, values):
     """Index of a combination of choices in mixed radix: the last choice varies fastest."""
     index = 0
     for name in table["choices"]:
@@ -74,7 +74,7 @@ def albedo(model_name, values, cos_theta_o):
     complete = {name: p["default"] for name, p in schema.items()} | values
     coordinates = complete | {"cos_theta_o": cos_theta_o}
     total = [0.0, 0.0, 0.0]
-    for term in table["terms"][_combination(table, schema, complete)]:
+    for term in table["terms"][combination(table, schema, complete)]:
         value = _interpolate(table["grids"][term["grid"]], coordinates)
         for name in term["colors"]:
             value = [v * c for v, c in zip(value, complete[name], strict=True)]

@@ -14,6 +14,7 @@
 #include "forms/error.h"
 #include "forms/made_of_fit.h"
 #include "forms/osl_form.h"
+#include "forms/whole.h"
 #include "measure/probes.h"
 #include "model/horizon.h"
 #include "model/under.h"
@@ -338,7 +339,7 @@ class AimedLamps {
   static Value in_scene_of(const char* v) { return in_scene(element(v, 0), element(v, 1), element(v, 2)); }
 
   /// The closure of the lobe. It is added at the left of the sum, which Cycles traverses without a stack. The weight is
-  /// a colour: see kPoolNode.
+  /// a colour: OSL stores it with the closure, and a number apart from it (peephole2() in its runtimeoptimize.cpp).
   static Statement closure() {
     constexpr int kSize = int(kRampSize);
     Variable level{"lobe_level", {}, kSize};
@@ -435,53 +436,6 @@ void leave_out_of_base(ShaderBody& body, const std::vector<RecordedClosure>& bas
   });
 }
 
-/// Where closures of Cycles' equal the model, these are all that the shader has to be.
-void add_whole(ShaderBody& body) {
-  const Model& model = body.model;
-  if (!has_whole(model)) return;
-  const auto name = [](const char* what, std::size_t i) { return fmt::format("whole_{}_{}", what, i); };
-  struct Facets {
-    ClosureKind kind;
-    bool metal;
-  };
-  std::vector<Facets> closures;
-  ChoiceSwitch by_choice(model.info(), body.setting.fixed);
-  body.record(by_choice, [&](const Choices&, const ParamValues& values) {
-    Recorder recorder;
-    Program program;
-    program.output("whole", under(model)->record_whole(model.info(), values));
-    closures.clear();
-    for (const Closure<Expr>& c : under(model)->record(model.info(), values, input3("wo"))) {
-      const std::size_t i = closures.size();
-      if (!has_facets(c.kind)) throw std::logic_error("closures that equal a model: only facets are known");
-      program.output(name("weight", i), c.weight);
-      if (c.metal) program.output(name("f0", i), c.f0);
-      program.output(name("alpha", i), c.alpha);
-      program.output(name("across", i), c.alpha_across);
-      closures.push_back({c.kind, c.metal});
-    }
-    return recording_of(model, std::move(program));
-  });
-  body.of_whole.push_back(declare("float", "whole"));
-  std::vector<Value> sum;
-  for (std::size_t i = 0; i < closures.size(); ++i) {
-    body.of_whole.push_back(declare_all("float", {name("alpha", i), name("across", i)}));
-    body.of_whole.push_back(declare("color", name("weight", i)));
-    if (closures[i].metal) body.of_whole.push_back(declare("color", name("f0", i)));
-    const Value white = call("color", {1.0}), black = call("color", {0.0});
-    const Value distribution = print::quotation(closures[i].kind == ClosureKind::Ggx ? "ggx" : "beckmann");
-    const Value alpha = name("alpha", i), across = name("across", i);
-    // As colours: see kPoolNode.
-    sum.push_back(Value(name("weight", i)) *
-                  (closures[i].metal
-                       ? call("generalized_schlick_bsdf", {"frame_n", "frame_t", white, black, alpha, across,
-                                                           name("f0", i), white, 5.0, distribution})
-                       : call("microfacet", {distribution, "frame_n", "frame_t", alpha, across, 1.0, 0})));
-  }
-  append(body.of_whole, print::scope(by_choice.statements()));
-  body.whole = print::balanced_sum(sum);
-}
-
 std::string Aimed::under_sizeless_lamps(int lamps, int slots) const {
   if (lamps <= slots) return "as on Blender's own nodes";
   const char* left_out = "as rare bright dots";
@@ -526,7 +480,7 @@ void Aimed::make_closures(ShaderBody& body) const {
     body.add(lost_below(model, "ray", "rest_weight"));
     body.terms.push_back(call("brdfc_signed_ray_anywhere", {"rest_weight", "rest_colour", "ray", "I", "frame_n"}));
   } else {
-    // As a colour: see kPoolNode.
+    // As a colour, which takes less memory: see AimedLamps::closure().
     body.add(declare("color", "rest_followed", "rest_weight"));
     body.add(ray);
     body.add(lost_below(model, "ray", "rest_followed"));

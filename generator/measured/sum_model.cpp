@@ -124,6 +124,7 @@ class PackedSum final : public OpaquePacked {
 
  private:
   Pack passed(std::size_t k, const Vec3<Pack>& wo) const {
+    if (!views_->dims()) return Pack(1);
     Pack out;
     for (std::size_t lane = 0; lane < kLanes; ++lane) out[lane] = views_->passed(k, wo.z[lane]);
     return out;
@@ -183,7 +184,7 @@ const std::vector<double>& Views::shares(double cosTheta_o) const {
 }
 
 double Views::passed(std::size_t lobe, double cosTheta_o) const {
-  if (passed_.empty()) return 1;
+  if (!dims()) return 1;
   const double at = std::sqrt(std::clamp(cosTheta_o, 0., 1.)) * kPassedSteps;
   const std::size_t i = std::min(std::size_t(at), std::size_t(kPassedSteps - 1));
   return std::lerp(passed_[lobe][i], passed_[lobe][i + 1], at - double(i));

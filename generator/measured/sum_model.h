@@ -44,6 +44,8 @@ class SumModel final : public OpaqueModel {
     Views(const std::vector<std::unique_ptr<Brdf<double>>>&, Stack);
     /// The probability that the lobe is sampled: adds up to 1 over the lobes.
     const std::vector<double>& shares(double cosTheta_o) const;
+    /// Whether passed() differs from 1.
+    bool dims() const { return !passed_.empty(); }
     /// The factor of the lobe's f: 1 in a sum.
     double passed(std::size_t lobe, double cosTheta_o) const;
 

@@ -16,7 +16,6 @@ from helpers import (
     arguments,
     pairs_csv,
     read_csv,
-    read_picture,
     render,
 )
 
@@ -165,14 +164,7 @@ def test_both_widths_show_where_shaders_do_not_run(extension, balls, model):
 def test_both_widths_show_in_eevee(extension, balls, model, tmp_path):
     narrow, wide = (extension.api.new_material(model, **v) for v in TWO_WIDTHS[model])
     expected = balls([narrow, wide], osl=False)
-    scene = bpy.context.scene
-    scene.render.engine = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0, 0) else "BLENDER_EEVEE"
-    scene.eevee.taa_render_samples = 16
-    scene.render.filepath = str(tmp_path / "eevee.exr")
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "eevee.blend"))
-    if missing := eevee.picture_of(tmp_path / "eevee.blend", scene.render.filepath):
-        pytest.skip(missing)
-    shown = read_picture(tmp_path / "eevee.exr")[..., :3]
+    shown = eevee.render(bpy.context.scene, tmp_path)
     for part in (np.s_[:, :32], np.s_[:, 32:64]):
         assert np.corrcoef(expected[part].ravel(), shown[part].ravel())[0, 1] > 0.9
 
@@ -307,14 +299,7 @@ def test_a_twin_in_eevee(extension, use_pack, tmp_path):
     scene.collection.objects.link(sun)
     scene.render.resolution_x, scene.render.resolution_y = 96, 48
 
-    scene.render.engine = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0, 0) else "BLENDER_EEVEE"
-    scene.eevee.taa_render_samples = 16
-    scene.render.filepath = str(tmp_path / "eevee.exr")
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "eevee.blend"))
-    if missing := eevee.picture_of(tmp_path / "eevee.blend", scene.render.filepath):
-        pytest.skip(missing)
-    shown = read_picture(tmp_path / "eevee.exr")[..., :3]
-    scene.render.engine = "CYCLES"
+    shown = eevee.render(scene, tmp_path)
     for material in materials:
         extension.api.switch_representation(material, "twin")
     expected = render(scene)[..., :3]
@@ -335,7 +320,7 @@ def test_a_twin_is_too_bright_in_an_old_version(extension, empty):
     material = extension.api.new_material("phong", "twin")
     found = {f.code for f in extension.api.warnings(material, empty)}
     assert ("leaning_facets" in found) == (bpy.app.version < (5, 0, 0))
-    empty.render.engine = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0, 0) else "BLENDER_EEVEE"
+    empty.render.engine = eevee.engine()
     assert "leaning_facets" not in {f.code for f in extension.api.warnings(material, empty)}
 
 
