@@ -56,17 +56,23 @@ _OF_MATERIAL, _OF_FORMULA, _LINKED, _METALS = 85, 60, 1.2, 45
 #: 201 under four area lamps (233 if one is `factors`), three 185 under three, four and five 179
 #: under two.
 _LAMPS_BESIDE = {2: 4, 3: 3, 4: 2, 5: 2}
+#: The same where sockets are linked: what follows from them is kept for each lamp and model. Two
+#: `microfacet` with one linked socket were measured to take 107 numbers, and 45 to 53 more for each
+#: lamp with one cone; a lamp with four takes 150, so no lamp has more than one here.
+_LAMPS_BESIDE_LINKED = {2: 2}
 
 
 @dataclass(frozen=True)
 class ClosureUsage:
     """The closure slots that the shaders of a material take without lamps, and for each lamp; the
-    number of its models that are Formula Nodes, and the numbers that the largest of them keeps."""
+    number of its models that are Formula Nodes, the numbers that the largest of them keeps, and
+    whether any of them has a linked socket."""
 
     slots: int
     slots_per_lamp: int
     trees: int
     numbers: float = 0
+    is_linked: bool = False
 
     def budget(self):
         """What it leaves for lamps; None if nothing aims at lamps."""
@@ -86,7 +92,8 @@ class ClosureUsage:
 
     def _numbers(self):
         if self.trees > 1:
-            return lamps.Budget.LAMP * _LAMPS_BESIDE.get(self.trees, 1)
+            beside = _LAMPS_BESIDE_LINKED if self.is_linked else _LAMPS_BESIDE
+            return lamps.Budget.LAMP * beside.get(self.trees, 1)
         return _STACK - _OF_MATERIAL - self.numbers if self.trees else math.inf
 
 
@@ -116,7 +123,7 @@ def _times(node):
 def of_material(material):
     """The ClosureUsage of a material: of all nodes that its output for Cycles depends on."""
     a_lamp = pack.manifest()["closure_slots"]["lamp"]
-    slots, slots_per_lamp, trees, numbers = 0, 0, 0, 0
+    slots, slots_per_lamp, trees, numbers, is_linked = 0, 0, 0, 0, False
     for node in (shown.node for shown in shader_trees.shown(material)):
         if model_nodes.is_ours(node) and (made := model_nodes.manifest_entry(node)):
             aimed_at = made.form.get("lamps") or 0
@@ -133,10 +140,10 @@ def of_material(material):
                 own = min(made.form.get("numbers", 0), _OF_FORMULA) + _LINKED * linked
                 if linked and pack.model(model_nodes.identity(node).model).may_be_closure:
                     own += _METALS
-                numbers = max(numbers, own)
+                numbers, is_linked = max(numbers, own), is_linked or linked > 0
         else:
             slots += _times(node) * _native_slots(node)
-    return ClosureUsage(slots, slots_per_lamp, trees, numbers)
+    return ClosureUsage(slots, slots_per_lamp, trees, numbers, is_linked)
 
 
 def _budgets():
