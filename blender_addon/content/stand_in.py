@@ -166,19 +166,13 @@ def has_node(model):
     return model.name in _NODES
 
 
-def needs_no_twin(model):
-    """Whether nodes of Blender stand in for a model with its albedo, so that its twin is not
-    used."""
-    return model.name in width_albedo.WIDTHS and model.has_albedo
-
-
 def node_of(group, form, sources):
     """The outputs, by name, of the nodes that stand in for a form. `sources`: outputs by
     parameter, and of the normal, which is 0 where the surface's own is meant."""
     w, model = Wiring(group), form.model
     given, normal = _Given(w, form, sources), w.bent_or_own(sources[pack.NORMAL])
     made = {"BSDF": _NODES[model.name](w, given, normal)}
-    if needs_no_twin(model):
+    if model.name in width_albedo.WIDTHS and model.has_albedo:
         viewer = w.node("ShaderNodeNewGeometry").outputs["Incoming"]
         cos_theta = w.vector("DOT_PRODUCT", normal, viewer, output="Value")
         made["Albedo"] = width_albedo.wire(w, model, given, cos_theta)

@@ -104,7 +104,7 @@ def _polynomial(w, terms, colours):
     return total
 
 
-class _Looked:
+class Looked:
     """Colours looked up in tables, by term and channel."""
 
     def __init__(self, wiring, tables):
@@ -146,7 +146,7 @@ def wire(tree, data, normal, parameters, name):
         tables = Picture(w, list(_tables(data)), cos_theta, place, name)
     else:
         tables = _Curves(w, cos_theta)
-    looked = _Looked(w, tables)
+    looked = Looked(w, tables)
     tint = tuple(data["tint"])
     for factor in factors:
         tint = w.vector("MULTIPLY", factor, tint)

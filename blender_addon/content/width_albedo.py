@@ -5,7 +5,7 @@ tables follow one parameter at most."""
 import numpy as np
 
 from ..packs import energy
-from .twin import Picture, place_on_axis
+from .twin import Looked, Picture, place_on_axis
 
 #: The widths by model.
 WIDTHS = {"microfacet": ("ax", "ay"), "ward": ("ax", "ay"), "ashikhmin_shirley": ("nu", "nv")}
@@ -34,34 +34,36 @@ def wire(w, model, given, cos_theta):
         place = place_on_axis(w, axis, w.mean(*map(given, varying)))
     defaults = {name: p["default"] for name, p in model.parameters.items()}
     terms = table["terms"][energy.combination(table, model.parameters, defaults)]
-    rows = [_rows(table["grids"][term["grid"]], widths) for term in terms]
-    picture = Picture(w, rows, cos_theta, place, f"{model.label} (albedo)")
-    total = None
-    for term, table_of_term in zip(terms, rows, strict=True):
-        colour = (1.0, 1.0, 1.0)
-        for name in term["colors"]:
-            colour = w.vector("MULTIPLY", given(name), colour)
-        part = w.vector("SCALE", colour, scale=picture.look_up(table_of_term))
-        total = part if total is None else w.vector("ADD", total, part)
+    found = [_channels(table["grids"][term["grid"]], widths) for term in terms]
+    every = [rows for channels in found for rows in channels]
+    picture = Picture(w, every, cos_theta, place, f"{model.label} (albedo)")
+    weights = [_product(w, [given(name) for name in term["colors"]]) for term in terms]
+    return Looked(w, picture).colour(found, weights)
+
+
+def _product(w, colours):
+    total = (1.0, 1.0, 1.0)
+    for colour in colours:
+        total = w.vector("MULTIPLY", colour, total)
     return total
 
 
-def _rows(grid, widths):
-    """Values (widths, views) of a grid of one channel, which has the view and one or both of the
-    widths as axes, for both widths alike."""
-    axes = grid["axes"]
-    values = np.reshape(grid["values"], [len(a["values"]) for a in axes])
-    of_widths = [a for a in axes if a["name"] != "cos_theta_o"]
-    # The view first, then each width: (views, widths) after one, and the diagonal of two.
-    at = [_weights(a, widths) for a in of_widths]
+def _channels(grid, widths):
+    """For each channel of a grid its values (widths, views), for both widths alike. Its axes are
+    the view, and one or both of the widths, or none."""
+    axes = {a["name"]: a for a in grid["axes"]}
+    views = axes.pop("cos_theta_o", {"values": [0.0]})  # a grid need not depend on the view
+    at = [_weights(a, widths) for a in axes.values()]
+    shape = [len(views["values"]), *(len(a["values"]) for a in axes.values()), grid["channels"]]
+    values = np.reshape(grid["values"], shape)
     if len(at) == 2:
-        values = np.einsum("cab,wa,wb->wc", values, *at)
+        values = np.einsum("cabk,wa,wb->kwc", values, *at)
     elif at:
-        values = np.einsum("ca,wa->wc", values, *at)
+        values = np.einsum("cak,wa->kwc", values, *at)
     else:
-        values = np.broadcast_to(values, (len(widths), len(values)))
-    views = np.linspace(0, 1, _VIEWS)
-    return [np.interp(views, axes[0]["values"], row) for row in values]
+        values = np.broadcast_to(values.T[:, None], (grid["channels"], len(widths), shape[0]))
+    x = np.linspace(0, 1, _VIEWS)
+    return [[np.interp(x, views["values"], row) for row in channel] for channel in values]
 
 
 def _weights(axis, places):

@@ -221,7 +221,6 @@ def _fill(group, form, albedo):
     # Lean groups hold only what a render needs.
     twin = form.model.forms.get("twin")
     stands_in = twin is not None and twin != form and "baked" not in group[TAG]
-    stands_in = stands_in and not stand_in.needs_no_twin(form.model)
     twin_group = _group_of(twin) if stands_in else None
     if form.is_native:
         group_content.fill_with_nodes(group, form, source, twin_group, _room_of(group[TAG]))
