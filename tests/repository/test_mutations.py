@@ -204,18 +204,36 @@ def faulty_program():
     # In the build folder, so that the compiler cache finds the objects in the next run.
     folder = build / "mutations"
     folder.mkdir(exist_ok=True)
-    compilers = []
+    # Only baseline objects: those for further instruction sets contain no formula in double.
+    objects = re.findall(r"\S*/brdfc_models\.dir/\S*\.o\b", link)
+    compilations = {
+        o: next(c for c in commands if f" -o {o} -c " in c).rpartition(" ") for o in objects
+    }
+    # A source is one model, or includes several.
+    texts = {
+        o: Path(source).read_text(encoding="utf-8")
+        if "/Unity/" in source
+        else f'#include "{source}"\n'
+        for o, (_, _, source) in compilations.items()
+    }
+    faulty = dict(texts)
     for path, pattern, replacement, _ in MODEL_FAULTS.values():
         original = ROOT / path
         source = folder / original.name
         text = original.read_text(encoding="utf-8")
         source.write_text(replaced_once(text, pattern, replacement, path), encoding="utf-8")
-        # Only the baseline object: those for further instruction sets contain no formula in double.
-        (old,) = re.findall(rf"\S*/brdfc_models\.dir/\S*/{re.escape(original.name)}\.o\b", link)
-        (compile_,) = (c for c in commands if c.endswith(f"-o {old} -c {original}"))
+        (old,) = (o for o in objects if f'#include "{original}"' in texts[o])
+        faulty[old] = faulty[old].replace(f'"{original}"', f'"{source}"')
+    compilers = []
+    for old in objects:
+        if faulty[old] == texts[old]:
+            continue
+        command, _, batch = compilations[old]
+        source = folder / f"faulty_{Path(batch).name}"
+        source.write_text(faulty[old], encoding="utf-8")
         new = source.with_suffix(".o")
         link = link.replace(old, str(new))
-        words = [w.replace(old, str(new)) for w in shlex.split(compile_)[:-1]]
+        words = [w.replace(old, str(new)) for w in shlex.split(command)]
         compilers.append(subprocess.Popen([*words, source], cwd=build))
     assert [c.wait() for c in compilers] == [0] * len(compilers)
     program = folder / "brdfc_tests"
