@@ -38,6 +38,7 @@
 // d'Eon: Importance Sampling Microfacet-Based BSDFs using the Distribution of Visible Normals, EGSR 2014). Smith's
 // beckmann takes these as well: its own need the inverse of an error function.
 #include "model/base_terms.h"
+#include "model/ggx.h"
 #include "model/under.h"
 #include "model/v_cavity.h"
 
@@ -114,16 +115,18 @@ template <class T> struct Microfacet {
   /// The masking that counts.
   bool has_masking(int which) const { return (distribution == MultiscatterGgx ? SmithCorrelated : masking) == which; }
 
+  GgxFacets<T> ggx() const { return {ax, ay}; }
+
   T D(const Vec3<T>& h) const {
-    if (!is_beckmann()) return named("D", T(1) / (pi<T>() * ax * ay * sqr(sqr(h.x / ax) + sqr(h.y / ay) + sqr(h.z))));
+    if (!is_beckmann()) return ggx().D(h);
     const Slopes<T> s(h);
     return named("D", exp(-(sqr(s.x / ax) + sqr(s.y / ay))) * sqr(s.inverse_cos2()) / (pi<T>() * ax * ay));
   }
 
   /// (n.w) Lambda, for w above the surface.
   T hidden(const Vec3<T>& w) const {
+    if (!is_beckmann()) return ggx().hidden(w);
     const T c = maximum(w.z, tiny<T>()), p2 = named("p2", sqr(ax * w.x) + sqr(ay * w.y));
-    if (!is_beckmann()) return p2 / (T(2) * (sqrt(c * c + p2) + c));
     const T p = sqrt(p2), a = named("a", minimum(c / maximum(p, tiny<T>()), T(1.6)));
     return select(a < T(1.6), p * (T(1) - a * (T(1.259) - T(0.396) * a)) / (T(3.535) + T(2.181) * a), T(0));
   }
@@ -178,19 +181,10 @@ template <class T> struct Microfacet {
     return select(above(wi, wo), D(k.h) * visible(k, wo), T(0));
   }
 
-  /// A normal that Smith's ggx shows to w.
-  Vec3<T> sample_caps(const Vec3<T>& w, const T& u1, const T& u2) const {
-    const Vec3<T> k = normalize(Vec3<T>{ax * w.x, ay * w.y, w.z});
-    // A direction of the cap of cosines above -k.z: 1 - cosine, without cancellation.
-    const T drop = u1 * (T(1) + k.z), sine = sqrt(maximum(drop * (T(2) - drop), T(0)));
-    const T phi = named("phi", T(2) * pi<T>() * u2);
-    return normalize(Vec3<T>{ax * (k.x + sine * cos(phi)), ay * (k.y + sine * sin(phi)), (T(1) - u1) * (T(1) + k.z)});
-  }
-
   Vec3<T> sample_normal(const Vec3<T>& wo, const Vec3<T>& u) const {
-    if (!folds()) return sample_caps(wo, u.y, u.z);
+    if (!folds()) return ggx().sample_normal(wo, u.y, u.z);
     const Vec3<T> up = {T(0), T(0), T(1)};
-    const Vec3<T> h = !is_beckmann() ? sample_caps(up, u.y, u.z) : sample_gaussian_slopes(ax, ay, u.y, u.z);
+    const Vec3<T> h = !is_beckmann() ? ggx().sample_normal(up, u.y, u.z) : sample_gaussian_slopes(ax, ay, u.y, u.z);
     const Vec3<T> opposite = {-h.x, -h.y, h.z};
     const T one = maximum(dot(wo, h), T(0)), other = maximum(dot(wo, opposite), T(0));
     return select(u.x * (one + other) < one, h, opposite);
