@@ -401,6 +401,7 @@ def page(model, scene, folder, pages):
     """The page of a model, and its pictures. `scene` is its part of report.json."""
     name = model["name"]
     strip(folder, scene, pages / f"{name}.jpg")
+    osl = "" if "nodes" in model["representations"] else "Open Shading Language on, "
     axis = axis_of(model)
     balls = [assigned(v) for v in shown(model)]
     values = next(iter(shown(model)[-1].items()))
@@ -414,7 +415,7 @@ def page(model, scene, folder, pages):
         f"![{model['label']}]({name}-picture.jpg)",
         "",
         "Materials of the [library](../../library.md) and others, in Cycles at Blender's default",
-        f"settings with {PICTURE_SPP} samples, denoised: `script/gallery pictures {name}`.",
+        f"settings with {PICTURE_SPP} samples, {osl}denoised: `script/gallery pictures {name}`.",
         "",
         "## Three balls under a lamp",
         "",

@@ -30,9 +30,9 @@ class _Surface:
         self.path_length = path.outputs["Ray Length"]
         missing = w.math("LESS_THAN", w.vector("LENGTH", normal, output="Value"), 0.5)
         own = w.scaled(geometry.outputs["Normal"], missing)
-        self.normal = w.vector("NORMALIZE", w.vector("ADD", normal, own))
+        self.normal = self.unbent = w.vector("NORMALIZE", w.vector("ADD", normal, own))
         if parts.has("bend"):
-            self.normal = _bent(parts, geometry, self.strand, self.normal)
+            self.normal = _bent(parts, geometry, self.strand, self.unbent)
         self.drawn = _random(w, self, 0.0)
         self.anywhere = _direction(w, *_random(w, self, 1.0)[:2])
         if tangent is None:
@@ -210,14 +210,21 @@ def _wired(w, data, normal, tangent, parameters, of_slots, cones, title):
         here |= dict(frame)
         given |= here | constants
         lamps = formula_lamps.seen(w, parts, of_slots, cones, here, data["widest"])
-    shaders.append(_rest(w, parts, surface, given, lamps, data["narrow"]))
-    shaders += formula_lamps.closures(w, parts, lamps, cones, given)
-    return {"BSDF": w.sum(shaders)}
+    others = [_rest(w, parts, surface, given, lamps, data["narrow"])]
+    others += formula_lamps.closures(w, parts, lamps, cones, given)
+    if parts.has("whole"):
+        others = [w.shown(parts.add("whole", **parameters)["others"], w.sum(others))]
+    return {"BSDF": w.sum(shaders + others)}
 
 
 def _of_base(w, closure, given, surface):
     """A closure of the base."""
     found = {name: given[of] for name, of in closure.items() if name not in ("kind", "along")}
+    stands = found.pop("stands", None)
+    if "f0" in found:
+        # Cycles bends the normal itself.
+        metal = w.metal(closure["kind"], **found, normal=surface.unbent, tangent=surface.tangent)
+        return w.shown(stands, metal)
     if closure["kind"] == "cone":
         return w.toon(found["weight"], found["size"], surface.normal, found["smooth"], "DIFFUSE")
     tangent = surface.tangent
@@ -226,7 +233,8 @@ def _of_base(w, closure, given, surface):
         tangent = w.vector("ADD", surface.view, w.scaled(tangent, 1e-3))
     stretched = (found["anisotropy"], tangent) if "anisotropy" in found else None
     roughness = found.get("roughness", 0.0)
-    return w.bsdf(closure["kind"], found["weight"], surface.normal, roughness, stretched)
+    bsdf = w.bsdf(closure["kind"], found["weight"], surface.normal, roughness, stretched)
+    return bsdf if stands is None else w.shown(stands, bsdf)
 
 
 def _rest(w, parts, surface, given, lamps, narrow):

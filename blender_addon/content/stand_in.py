@@ -59,12 +59,16 @@ def keep_one_text():
         found[0].name = _FILE
 
 
-#: Blender's nodes for models without a twin, which scatter nothing: the kind, and the parameter for
-#: each socket.
+#: Blender's nodes for models without a twin, which scatter nothing or let light through: the kind,
+#: and the parameter for each socket; that of Roughness is its square.
 _NODES = {
     "glass": ("ShaderNodeBsdfGlass", {"IOR": "ior"}),
     # Its colour tints what is reflected as well, which is little beside what is refracted.
     "fresnel_dielectric": ("ShaderNodeBsdfGlass", {"IOR": "ior", "Color": "refracted"}),
+    "rough_glass": (
+        "ShaderNodeBsdfGlass",
+        {"IOR": "ior", "Color": "refracted", "Roughness": "alpha"},
+    ),
     "fresnel_conductor": (
         "ShaderNodeBsdfMetallic",
         {"IOR": ("n_r", "n_g", "n_b"), "Extinction": ("k_r", "k_g", "k_b")},
@@ -84,6 +88,8 @@ def node_of(group, form, parameters):
     node = group.nodes.new(kind)
     if kind == "ShaderNodeBsdfMetallic":
         node.fresnel_type = "PHYSICAL_CONDUCTOR"
+    else:
+        node.distribution = "GGX"  # light that is reflected once
     node.inputs["Roughness"].default_value = 0.0
 
     def give(socket, name):
@@ -94,6 +100,12 @@ def node_of(group, form, parameters):
             socket.default_value = (*value, 1.0) if isinstance(value, (tuple, list)) else value
 
     for name, source in given.items():
+        if name == "Roughness":
+            root = group.nodes.new("ShaderNodeMath")
+            root.operation = "SQRT"
+            give(root.inputs[0], source)
+            group.links.new(root.outputs[0], node.inputs[name])
+            continue
         if isinstance(source, str):
             give(node.inputs[name], source)
             continue

@@ -88,6 +88,19 @@ class Wiring:
             self.give(node.inputs["Tangent"], stretched[1])
         return node.outputs["BSDF"]
 
+    def metal(self, kind, f0, edge, roughness, anisotropy, rotation, normal, tangent):
+        node = self.node(
+            "ShaderNodeBsdfMetallic", fresnel_type="F82", distribution=DISTRIBUTIONS[kind]
+        )
+        self.give(node.inputs["Base Color"], f0)
+        self.give(node.inputs["Edge Tint"], edge)
+        self.give(node.inputs["Roughness"], roughness)
+        self.give(node.inputs["Anisotropy"], anisotropy)
+        self.give(node.inputs["Rotation"], rotation)
+        self.give(node.inputs["Normal"], normal)
+        self.give(node.inputs["Tangent"], tangent)
+        return node.outputs["BSDF"]
+
     def sum(self, shaders):
         while len(shaders) > 1:
             node = self.node("ShaderNodeAddShader")

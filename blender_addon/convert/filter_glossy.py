@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether Cycles' Filter Glossy makes pictures of a node and of its model different: after a bounce
 that spreads the light, it blurs the lobes of Blender's nodes, and those of Formula Nodes, but not
-those of shaders in Open Shading Language.
+those of shaders in Open Shading Language, unless they are one of Cycles' closures.
 
 Measured for a floor in a room with white walls under an area lamp, by renders of Blender's node
 (tests/blender/test_filter_glossy.py). At a setting of 1 the picture of metal gets 10 % darker at a

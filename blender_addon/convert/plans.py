@@ -57,7 +57,7 @@ def _plan_glass(material, node, inputs):
     inputs.setting("mute")
     inputs.check_unknown(KNOWN_SOCKETS["glass"])
     if inputs.value("Roughness") > 1e-3:
-        raise Refused(say("no model is of rough glass"))
+        raise Refused(say("the model of rough glass is darker under lamps"))
     if inputs.value("Thin Film Thickness") != 0:
         raise Refused(say("it has {what}", what=Sentence("Thin Film")))
     # Blender's glass tints both reflected and transmitted light.
@@ -80,7 +80,7 @@ def _plan_clear(material, node, inputs):
     inputs.check_unknown(KNOWN_SOCKETS["principled"])
     check_off(inputs, but={"Transmission Weight"})
     if inputs.value("Roughness") > 1e-3:
-        raise Refused(say("no model is of rough glass"))
+        raise Refused(say("the model of rough glass is darker under lamps"))
     if inputs.value("Specular IOR Level") != 0.5:
         raise Refused(say("it has {what}", what=Sentence("Specular IOR Level")))
     if inputs.value("Specular Tint", (1.0, 1.0, 1.0)) != (1, 1, 1):
@@ -218,6 +218,12 @@ def _part(inputs, native, fit, color):
     )
 
 
+def _is_closure(part):
+    """Whether a closure of Cycles' equals the part's model, whatever is linked to it. Roughnesses
+    follow one socket, which does not change their ratio."""
+    return pack.model(part.model).is_closure(part.values | dict.fromkeys(part.links))
+
+
 def _errors(found):
     """Of (light, error) of each colour and roughness the errors, except where there is next to no
     light."""
@@ -325,7 +331,9 @@ def _plan_node(material, node, inputs):
         more |= {"material": material, "node": node}
         more |= {"error": max(errors), "least_error": min(errors)}
         more |= {"anisotropic": any(look["stretch"] != 1 for look in looks)}
-        more |= {"filtered": any(is_filtered(Native(**given, **look)) for look in looks)}
+        blurred = any(is_filtered(Native(**given, **look)) for look in looks)
+        models = (one for one in (part, more.get("metal")) if one)
+        more |= {"filtered": blurred and not all(map(_is_closure, models))}
         cause = functools.cache(functools.partial(_cause, given, looks, max(errors), error_without))
         return Plan(**vars(part), **more, cause=cause)
 

@@ -219,6 +219,19 @@ def constants(node):
     return all_values(node) | dict.fromkeys(varying(node))
 
 
+#: Forms that are one of Cycles' closures where that equals the model.
+_WITH_CLOSURES = ("aimed", "nodes")
+
+
+def is_closure(node):
+    """Whether a group node of this version is one of Cycles' closures at its values."""
+    name, form = identity(node)
+    if form not in _WITH_CLOSURES:
+        return False
+    model = pack.model(name)
+    return model.may_be_closure and model.is_closure(constants(node))
+
+
 def uses_albedo(node):
     """Whether a group node's Albedo output is linked."""
     return ALBEDO in node.outputs and node.outputs[ALBEDO].is_linked

@@ -116,7 +116,9 @@ def description(entry):
     Open Shading Language matters."""
     model = pack.model(entry.model)
     text = f"{entry.description}. {model.label}: {model.paper}"
-    if model.native_form and model.native_form.refusal(entry.values):
+    if model.native_form is None:
+        text += ". Needs Open Shading Language: without it, Blender's own nodes are shown"
+    elif model.native_form.refusal(entry.values):
         text += ". Needs Open Shading Language: without it, the model's default choices are shown"
     return text
 

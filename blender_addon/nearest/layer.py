@@ -94,4 +94,7 @@ def schlick_like(f0, tint=1.0):
     # A tint of 0 reflects nothing at normal incidence.
     off = (np.abs(found - wanted) / (wanted + 1e-3)).mean(-1)
     i, j = np.unravel_index(np.argmin(off), off.shape)
+    # Without a tint the model is one of Blender's nodes, which is quicker.
+    if off[:, -1].min() < 1.02 * off[i, j]:
+        i, j = int(np.argmin(off[:, -1])), -1
     return float(f0s[i, 0, 0]), float(tints[j, 0])

@@ -139,6 +139,23 @@ class Model:
                 return form
         return None
 
+    @cached_property
+    def may_be_closure(self):
+        """Whether is_closure() holds for some values."""
+        from ..brdfc import model as formulas
+
+        return any(found.whole for found in formulas(self.name).formulas.values())
+
+    def is_closure(self, values):
+        """Whether a closure of Cycles' equals the model at these values; None stands for one that
+        is linked. Formula Nodes and the aimed form are then that closure."""
+        from ..brdfc import model as formulas
+
+        try:
+            return formulas(self.name).is_closure(values | self.fixed)
+        except ValueError:  # a value that scripts set outside of its range
+            return False
+
     def automatic(self, values=None, osl=True):
         """The Form that "auto" takes with or without OSL: the model's preferred one, or the next if
         that does not support `values`."""

@@ -47,9 +47,10 @@ _STACK = 255
 #: those of linked sockets, each with a part of what is computed from it. With GLOG_v=3 in its
 #: environment, Blender prints the sum. 22 models were measured to take at most 192 under four area
 #: lamps and 243 under eight, `factors` 234 and 247. With all sockets linked, `radziszewski_alda`
-#: takes 253 under eight, `microfacet` 239 under the seven that it then has room for, and `factors`,
-#: which has 22 colours, 242 under one.
-_OF_MATERIAL, _OF_FORMULA, _LINKED = 85, 60, 1.2
+#: takes 253 under eight, and `factors`, which has 22 colours, 242 under one. `microfacet`, whose
+#: base has Metallic nodes with sockets of their own, takes 239 under two, and with linked sockets
+#: _METALS more are counted.
+_OF_MATERIAL, _OF_FORMULA, _LINKED, _METALS = 85, 60, 1.2, 45
 #: How many lamps there is room for beside several models as Formula Nodes. Cycles computes what
 #: their parts have in common first, for all lamps, and keeps it. Two models were measured to take
 #: 201 under four area lamps (233 if one is `factors`), three 185 under three, four and five 179
@@ -119,6 +120,9 @@ def of_material(material):
     for node in (shown.node for shown in shader_trees.shown(material)):
         if model_nodes.is_ours(node) and (made := model_nodes.manifest_entry(node)):
             aimed_at = made.form.get("lamps") or 0
+            if aimed_at and model_nodes.is_closure(node):
+                slots += _times(node) * _NATIVE_SLOTS["ShaderNodeBsdfMetallic"]
+                continue
             slots += _times(node) * (made.form.get("slots", 0) - aimed_at * a_lamp)
             slots_per_lamp += _times(node) * a_lamp * bool(aimed_at)
             if aimed_at and model_nodes.identity(node).form == "nodes":
@@ -127,6 +131,8 @@ def of_material(material):
                     3 if s.type in ("VECTOR", "RGBA") else 1 for s in node.inputs if s.is_linked
                 )
                 own = min(made.form.get("numbers", 0), _OF_FORMULA) + _LINKED * linked
+                if linked and pack.model(model_nodes.identity(node).model).may_be_closure:
+                    own += _METALS
                 numbers = max(numbers, own)
         else:
             slots += _times(node) * _native_slots(node)

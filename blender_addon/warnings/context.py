@@ -14,6 +14,8 @@ from . import closure_slots
 
 #: Nodes of a world with a uniform colour.
 _PLAIN_WORLD = {"ShaderNodeBackground", "ShaderNodeOutputWorld"}
+#: What is to be said of a form that is one of Cycles' closures.
+_OF_CLOSURES = ("caustics", "filter_glossy")
 
 
 def twin_of(node):
@@ -115,6 +117,9 @@ class NodeContext:
         if stood_in:
             twin = twin_of(node)
             self.form = twin.entry if twin else {}
+        elif self.is_current and model_nodes.is_closure(node):
+            kept = [code for code in self.form.get("warnings", []) if code in _OF_CLOSURES]
+            self.form = self.form | {"warnings": kept, "lamps": 0}
         in_cycles = self.of_scene.in_cycles
         #: The form if Cycles renders it, and the number of lamps that it aims at.
         self.cycles_form = self.form if in_cycles else {}

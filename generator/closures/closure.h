@@ -24,7 +24,8 @@ enum class ClosureKind {
   DiffuseRamp,  ///< diffuse_ramp(N, colours): ramp8(c) / pi, without a cosine
   PhongRamp,    ///< phong_ramp(N, e, colours): ramp8(cos^e a) (N.wi) (e+2)/(2 pi) cos^e a
   Reflection,   ///< reflection(N): delta in the direction of ideal reflection
-  Ggx,          ///< microfacet("ggx", N, 0, a, a, 1, 0): no Fresnel term, Smith's height-correlated masking
+  Ggx,          ///< microfacet("ggx", N, 0, a, a, 1, 0): no Fresnel term but that of Closure::metal, Smith's
+                ///< height-correlated masking
   Beckmann,     ///< microfacet("beckmann", ...): the same, with Walter's rational masking as in Cycles
   GlossyToon,   ///< glossy_toon(N, size, smooth): a cone about the mirror direction, constant within `size` and
                 ///< decreasing to 0 over `smooth`, linearly in the angle; without a cosine
@@ -68,8 +69,13 @@ template <class T> struct Closure {
   Rgb<T> albedo;                       ///< OrenNayar: albedo of the facets, from 0 to 1
   T size, smooth;                      ///< toons: in units of 90 degrees, from 0 to 1
   T ior;                               ///< Refraction: index of the far side over that of the viewer's
+  Rgb<T> f0;                           ///< if `metal`: reflectance of a facet seen from above, from 0 to 1
+  Rgb<T> edge;                         ///< if `metal`: Edge Tint, from 0 to 1
   bool turned = false;                 ///< true if `normal` is not the surface's; it must not point below the surface
   Tangent stretched = Tangent::None;   ///< the kind of `tangent`
+  /// Ggx, Beckmann: true if facets have metal_fresnel(), as in Blender's Metallic BSDF with the Fresnel type F82 Tint,
+  /// whose weight is a Mix Shader, from 0 to 1. With a white Edge Tint generalized_schlick_bsdf() is the same.
+  bool metal = false;
 
   Closure(ClosureKind kind_, const Rgb<T>& weight_)
       : kind(kind_),
@@ -83,11 +89,27 @@ template <class T> struct Closure {
         albedo(T(0)),
         size(0),
         smooth(1),
-        ior(1) {}
+        ior(1),
+        f0(T(0)),
+        edge(T(1)) {}
 };
 
 /// The closures of a shader; their sum is its BSDF.
 template <class T> using ClosureSum = std::vector<Closure<T>>;
+
+/// Schlick's Fresnel term of facets seen at 82 degrees, where the cosine is 1/7.
+template <class T> Rgb<T> fresnel_at_82(const Rgb<T>& f0) {
+  constexpr double kGrazing = 7776. / 16807;  // (6/7)^5
+  return f0 + (Rgb<T>(T(1)) - f0) * T(kGrazing);
+}
+/// The Fresnel term of metals with an Edge Tint, of one minus the cosine at which facets are seen. P. Kutz, M. Hasan,
+/// D. Edmondson: Novel Aspects of the Adobe Standard Material, 2021; Cycles takes what is negative for 0.
+template <class T> Rgb<T> metal_fresnel(const Rgb<T>& f0, const Rgb<T>& edge, const T& one_minus_cos) {
+  const Rgb<T> one(T(1));
+  const T s = T(7. / 6) * one_minus_cos, s2 = s * s, q = T(7) * (T(1) - one_minus_cos) * s2 * s2 * s2;
+  const Rgb<T> F = f0 + (one - f0) * pow5(one_minus_cos) - (one - edge) * fresnel_at_82(f0) * q;
+  return (F + sqrt(F * F)) * T(0.5);
+}
 
 /// Smith's Lambda, from the square of alpha times the tangent of the direction's angle.
 template <class T> T lambda(ClosureKind kind, const T& a2) {
@@ -246,7 +268,12 @@ Rgb<T> evaluate(const Closure<T>& c, const Vec3<T>& wi, const Vec3<T>& wo, const
         if (c.turned) return microfacet(c.kind, c.alpha, c.normal, wi, wo);
         return microfacet(c.kind, c.alpha, c.alpha, wi, wo);
       };
-      return select(both, c.weight * of_facets(), none);
+      if (!c.metal) return select(both, c.weight * of_facets(), none);
+      // From the sine of half the angle between the directions, whose squared distance is four times its square.
+      const Vec3<T> between = wi - wo;
+      const T sin2 = dot(between, between) / T(4);
+      const T one_minus_cos = sin2 / (T(1) + sqrt(maximum(T(1) - sin2, T(0))));
+      return select(both, c.weight * metal_fresnel(c.f0, c.edge, one_minus_cos) * of_facets(), none);
     }
     case ClosureKind::GlossyToon: {
       const T cosAlpha = T(2) * cosTheta_o * cosTheta_i - dot(wo, wi);

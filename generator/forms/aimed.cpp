@@ -16,6 +16,7 @@
 #include "forms/osl_form.h"
 #include "measure/probes.h"
 #include "model/horizon.h"
+#include "model/under.h"
 #include "print/statement.h"
 
 namespace brdfc::forms {
@@ -398,7 +399,8 @@ class Aimed final : public OslForm {
     // lamps.
     if (mirror) codes.insert(codes.end(), {"multiple_importance", "clamp_mirror"});
     if (shader.closures - shader.lamps - (mirror ? 1 : 0) == 1) codes.push_back("normal_pass");
-    if (mirror) codes.push_back("filter_glossy");
+    if (has_whole(model)) codes.push_back("caustics");
+    if (mirror || has_whole(model)) codes.push_back("filter_glossy");
     return codes;
   }
   bool highlights(const Model& model, const Shader&) const override { return !model.has_mirror(); }
@@ -431,6 +433,45 @@ void leave_out_of_base(ShaderBody& body, const std::vector<RecordedClosure>& bas
   body.shader.leaning = std::any_of(base.begin(), base.end(), [](const RecordedClosure& c) {
     return c.turned && c.kind == ClosureKind::DiffuseRamp;
   });
+}
+
+/// Where closures of Cycles' equal the model, these are all that the shader has to be.
+void add_whole(ShaderBody& body) {
+  const Model& model = body.model;
+  if (!has_whole(model)) return;
+  const auto name = [](const char* what, std::size_t i) { return fmt::format("whole_{}_{}", what, i); };
+  std::vector<ClosureKind> kinds;
+  ChoiceSwitch by_choice(model.info(), body.setting.fixed);
+  body.record(by_choice, [&](const Choices&, const ParamValues& values) {
+    Recorder recorder;
+    Program program;
+    program.output("whole", under(model)->record_whole(model.info(), values));
+    kinds.clear();
+    for (const Closure<Expr>& c : under(model)->record(model.info(), values, input3("wo"))) {
+      if (!c.metal) continue;
+      const std::size_t i = kinds.size();
+      program.output(name("stands", i), max_component(c.weight));
+      program.output(name("f0", i), c.f0);
+      program.output(name("alpha", i), c.alpha);
+      program.output(name("across", i), c.alpha_across);
+      kinds.push_back(c.kind);
+    }
+    return recording_of(model, std::move(program));
+  });
+  body.of_whole.push_back(declare("float", "whole"));
+  std::vector<Value> metals;
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    body.of_whole.push_back(declare_all("float", {name("stands", i), name("alpha", i), name("across", i)}));
+    body.of_whole.push_back(declare("color", name("f0", i)));
+    const Value white = call("color", {1.0}), black = call("color", {0.0});
+    // As a colour: see kPoolNode.
+    metals.push_back(call("color", {name("stands", i)}) *
+                     call("generalized_schlick_bsdf",
+                          {"frame_n", "frame_t", white, black, name("alpha", i), name("across", i), name("f0", i),
+                           white, 5.0, print::quotation(kinds[i] == ClosureKind::Ggx ? "ggx" : "beckmann")}));
+  }
+  append(body.of_whole, print::scope(by_choice.statements()));
+  body.whole = print::balanced_sum(metals);
 }
 
 std::string Aimed::under_sizeless_lamps(int lamps, int slots) const {
@@ -489,6 +530,7 @@ void Aimed::make_closures(ShaderBody& body) const {
     body.terms.push_back(Value("rest_followed") * call("brdfc_ray_coloured", {"ray", "I", "rest_colour"}));
   }
   body.turn(base);
+  add_whole(body);
 }
 
 }  // namespace

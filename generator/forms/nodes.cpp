@@ -82,10 +82,23 @@ ClosureSum<Expr> record_base(const Model& model, const ParamValues& fixed, const
     Rgb<Expr>& color = is_rough_matte ? c.albedo : c.weight;
     std::array<double, 3> known{1, 1, 1};
     const bool is_black = color.is_constant(&known) && known == std::array<double, 3>{};
+    if (c.metal) {
+      output("stands", max_component(c.weight));
+      output("f0", c.f0);
+      output("edge", c.edge);
+      // As Blender's Metallic BSDF has it: with r its squared Roughness and q = 1 - 0.9 anisotropy, alpha is r /
+      // sqrt(q) along the tangent and r sqrt(q) across it. A rotation of 0.25 is a right angle.
+      const Expr large = maximum(c.alpha, c.alpha_across), small = minimum(c.alpha, c.alpha_across);
+      output("roughness", sqrt(sqrt(large * small)));
+      output("anisotropy", (Expr(1) - small / large) * Expr(1 / (1 - kLeastAspect)));
+      output("rotation", select(c.alpha < c.alpha_across, Expr(0.25), Expr(0)));
+    }
     // Facets are not matte, so bent normals do not darken them.
-    output("weight", has_facets(c.kind) ? color : color * Expr::input("stands"));
+    if (!c.metal) output("weight", has_facets(c.kind) ? color : color * Expr::input("stands"));
     if (is_rough_matte) output("roughness", c.roughness);
-    if (has_facets(c.kind)) {
+    if (has_facets(c.kind) && !c.metal) {
+      // Cycles keeps a node whose colour is black, and what its other inputs need.
+      if (has_whole(model)) output("stands", select(Expr(0) < max_component(color), Expr(1), Expr(0)));
       // As Blender's Glossy node has it: with r its squared Roughness, alpha is r (1 - anisotropy) along the tangent
       // and r / (1 - anisotropy) across it, or r / (1 + anisotropy) and r (1 + anisotropy) if it is negative.
       const bool is_stretched = c.stretched != Tangent::None;
@@ -102,7 +115,11 @@ ClosureSum<Expr> record_base(const Model& model, const ParamValues& fixed, const
     }
     closures.push_back(closure);
     if (is_black) continue;
-    color = Rgb<Expr>::input(closure["weight"]);
+    color = c.metal ? Rgb<Expr>(Expr::input(closure["stands"])) : Rgb<Expr>::input(closure["weight"]);
+    if (c.metal) {
+      c.f0 = Rgb<Expr>::input(closure["f0"]);
+      c.edge = Rgb<Expr>::input(closure["edge"]);
+    }
     used.push_back(c);
   }
   return used;
@@ -120,6 +137,7 @@ struct NodeRecording {
   bool native = false;     ///< Blender's closures equal the whole model
   Json closures, of_base;  ///< kinds of closures, and the names of their inputs
   Program give;            ///< computes the inputs of `closures`
+  Program whole;           ///< computes `others`: 0 where the base is all of the model, otherwise 1
   bool facets = false;     ///< whether the base has facets
   Program base;            ///< computes the inputs of `of_base`
   Program value, draw;     ///< f cos - base and pdf; a drawn direction and its weight
@@ -131,6 +149,7 @@ NodeRecording record_nodes(const Model& model, const ParamValues& fixed) {
                     .closures = Json::array(),
                     .of_base = Json::array(),
                     .give = {},
+                    .whole = {},
                     .base = {},
                     .value = {},
                     .draw = {}};
@@ -153,6 +172,7 @@ NodeRecording record_nodes(const Model& model, const ParamValues& fixed) {
   }
   const Vec3<Expr> wo = input3("wo"), wi = input3("wi");
   const ClosureSum<Expr> base = record_base(model, fixed, *brdf, out.base, out.of_base);
+  if (has_whole(model)) out.whole.output("others", Expr(1) - under(model)->record_whole(model.info(), fixed));
   out.facets = std::ranges::any_of(base, [](const Closure<Expr>& c) { return has_facets(c.kind); });
   const Rgb<Expr> f = brdf->eval(wi, wo) * abs(wi.z);
   const bool has_base = !out.of_base.empty();
@@ -198,6 +218,7 @@ std::vector<std::pair<const char*, NodeProgram>> record_parts(const Model& model
   if (!first.closures.empty()) add("closures", &NodeRecording::give);
   if (first.native) return out;
   if (!first.of_base.empty()) add("base", &NodeRecording::base);
+  if (has_whole(model)) add("whole", &NodeRecording::whole);
   const print::NodePrograms made = print::node_programs(program(&NodeRecording::value), {"wi_x", "wi_y", "wi_z"},
                                                         "kept_", node_vectors(), {"density"});
   out.push_back({"once", made.once});
@@ -264,7 +285,9 @@ double excess_in_passes(const Model& model) {
     };
     excess -= measure::integrate(reflected, 1, {{}}, {.absolute = 1e-4}).value[0];
     for (const Closure<double>& c : base)
-      excess += mean(c.kind == ClosureKind::OrenNayar ? c.weight * c.albedo : c.weight);
+      excess += mean(c.kind == ClosureKind::OrenNayar ? c.weight * c.albedo
+                     : c.metal                        ? c.weight * metal_fresnel(c.f0, c.edge, 1 - cosine)
+                                                      : c.weight);
   }
   return excess / kCosines.size();
 }

@@ -278,12 +278,15 @@ Shader OslForm::write(const Model& model, const measure::AlbedoTable& table, con
     made.terms.push_back(Value("mirror_weight") * call("reflection", {"frame_n"}));
     shader.slots += slots(ClosureKind::Reflection);
   }
-  append(body, made.statements);
+  Statements sum = made.statements;
   shader.closures = int(made.terms.size()) + std::max(shader.lamps - 1, 0);
   if (shader.slots > kMaxClosures)
     input_error("{}: the {} form needs {} closure slots, and Cycles keeps {}", info.name, name(), shader.slots,
                 kMaxClosures);
-  add(assign("BSDF", print::balanced_sum(made.terms)));
+  sum.push_back(assign("BSDF", print::balanced_sum(made.terms)));
+  append(body, made.of_whole);
+  if (made.whole) sum = {print::If{operation("whole", "!=", 0.0), {assign("BSDF", *made.whole)}, sum}};
+  append(body, sum);
   add(print::Gap{});
   Statements of_albedo;
   const bool with_albedo = info.properties.albedo_table;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -22,6 +23,9 @@ struct ShaderBody {
   SharedArrays arrays = {};
   print::Statements statements = {};     ///< between the frame's declarations and the assignment of BSDF
   std::vector<print::Value> terms = {};  ///< the closures whose sum is BSDF
+  /// What BSDF is where the variable `whole` is not 0; the statements above are left out then.
+  std::optional<print::Value> whole = {};
+  print::Statements of_whole = {};  ///< assigns the variables of `whole`
 
   /// Records once for each combination of choices that the fixed values allow; the callback gets the combination
   /// together with the fixed values. Returns the closures, which must be the same for all combinations that have any,

@@ -62,6 +62,7 @@ std::string ramp_entry(std::size_t closure, std::size_t i) { return fmt::format(
 std::vector<RecordedClosure> output_closures(const ClosureSum<Expr>& sum, Program& program, Division division) {
   std::vector<RecordedClosure> recorded;
   for (std::size_t c = 0; c < sum.size(); ++c) {
+    if (sum[c].metal) throw std::logic_error("facets with a Fresnel term are no part of a sum");
     recorded.push_back(
         {sum[c].kind, sum[c].turned, sum[c].stretched, has_ramp(sum[c].kind) ? division : Division::Done});
     program.output(fmt::format("weight_{}", c), sum[c].weight);

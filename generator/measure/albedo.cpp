@@ -207,6 +207,9 @@ struct Estimate {
   double error = 0;
 };
 
+/// What an edge across the cells over directions changes at most if two meshes take it for smooth.
+constexpr double kEdges = 3e-5;
+
 /// The estimate for models whose sample() can't be integrated over its random numbers: the integral over directions if
 /// two meshes agree and contain all of the guide's density, or if it agrees with the mean of samples; otherwise that
 /// mean.
@@ -220,7 +223,7 @@ Estimate estimate_over_directions(const AlbedoIntegrator& integrator, const Albe
     directions = finer;
     if (rule > slack || moved > slack) continue;
     const double missed = integrator.missed_density(cubature, guides);
-    if (missed <= slack) return {directions.value, std::max({rule, moved, missed})};
+    if (missed <= slack) return {directions.value, std::max({rule, moved, missed, kEdges})};
   }
   const CubatureResult witness = integrator.witness(options.witnesses);
   const double chance = largest(witness.error), apart = distance(directions, witness);
@@ -256,7 +259,6 @@ Estimate estimate(const AlbedoIntegrator& integrator, const AlbedoOptions& optio
     // If two meshes over directions agree, they are trusted; the integrals over samples all rely on the pdf and may be
     // wrong. There are two exceptions: edges across the cells, which both meshes may take for smooth, and peaks that
     // both missed. A missed peak shows up as missed density.
-    constexpr double kEdges = 3e-5;
     if (effort > 0 && d <= slack && directions_moved <= slack) {
       const bool missed = apart > kEdges && integrator.missed_density(cubature, 512 << effort) > kEdges;
       return {directions.value, std::max({d, directions_moved, missed ? apart : std::min(apart, kEdges)})};

@@ -40,9 +40,10 @@ template <class T> T refracted_share(const T& cosTheta, const T& g, const T& eta
 
 /// `eta` is the index of the far side divided by that of the incident side. With g^2 = eta^2 - sin^2,
 ///   r_s = (1 - eta^2) / (c + g)^2,  r_p = (eta^2 - 1) (eta^2 c^2 - s^2) / (eta^2 c + g)^2,
-/// where differences of similar numbers are expanded. T has its own formula and is not computed as 1 - R.
-template <class T> Dielectric<T> fresnel_dielectric(const T& cosTheta, const T& sin2, const T& eta) {
-  const T sine = sqrt(sin2), c2 = cosTheta * cosTheta, step = (eta - T(1)) * (eta + T(1));
+/// where differences of similar numbers are expanded. T has its own formula and is not computed as 1 - R. `step` is
+/// eta^2 - 1, for callers that know it better.
+template <class T> Dielectric<T> fresnel_dielectric(const T& cosTheta, const T& sin2, const T& eta, const T& step) {
+  const T sine = sqrt(sin2), c2 = cosTheta * cosTheta;
   // eta^2 - sin^2; near the horizon computed from the cosine.
   const T g2 = named("g2", select(c2 < T(0.5), c2 + step, (eta - sine) * (eta + sine)));
   const auto total = g2 <= T(0);  // total internal reflection
@@ -54,6 +55,10 @@ template <class T> Dielectric<T> fresnel_dielectric(const T& cosTheta, const T& 
   const T rp = named("r_p", step * ((ec - sine) * (ec + sine)) / dp);
   const T through = refracted_share(cosTheta, g, eta);
   return {named("R_f", select(total, T(1), (rs * rs + rp * rp) / T(2))), named("T_f", select(total, T(0), through))};
+}
+
+template <class T> Dielectric<T> fresnel_dielectric(const T& cosTheta, const T& sin2, const T& eta) {
+  return fresnel_dielectric(cosTheta, sin2, eta, (eta - T(1)) * (eta + T(1)));
 }
 
 /// The same for a direction on either side of the surface. `ior` is the index inside (z < 0) divided by the one

@@ -4,9 +4,12 @@
 //
 // A model declares them as under(wo), and registers that with BRDFC_UNDER after BRDFC_MODEL. For any parameters and
 // directions their sum is at most f cos(theta_i), but for 2e-4 of the model's light; weights are not negative. They are
-// of kinds that Blender has a node for: Diffuse, OrenNayar with the weight 1, DiffuseToon, Ggx and Beckmann, all about
-// the surface's normal. Anisotropic facets are stretched along the x axis or the view. For all choices the kinds are
-// the same; a choice may have the weight 0.
+// of kinds that Blender has a node for: Diffuse, OrenNayar with the weight 1, DiffuseToon, Ggx and Beckmann, also as
+// metal with a grey weight from 0 to 1, all about the surface's normal. Anisotropic facets are stretched along the x
+// axis or the view. For all choices the kinds are the same; a choice may have the weight 0.
+//
+// A model that these closures equal for some parameters says so by whole(), and is then made of them alone, in the form
+// of nodes and in the aimed form.
 #pragma once
 
 #include <array>
@@ -17,6 +20,9 @@
 
 namespace brdfc::inline model {
 
+/// Blender's Metallic BSDF takes no roughness that is less than this times the other one.
+inline constexpr double kLeastAspect = 0.1;
+
 /// The base of a model.
 struct Under {
   /// With the parameters as Model::record() has them. A Recorder must be active.
@@ -26,9 +32,14 @@ struct Under {
   /// the base, times `stands`, is less than f cos(theta_i).
   Sample<Expr> (*sample)(const ModelInfo&, const ParamValues& fixed, const Vec3<Expr>& wo, const Vec3<Expr>& u,
                          const Expr& stands);
+  /// 1 where the base is all of the model, otherwise 0: it depends on the parameters alone. Null where it never is.
+  Expr (*record_whole)(const ModelInfo&, const ParamValues& fixed);
+  double (*bound_whole)(const ModelInfo&, const ParamValues&);
 };
 /// That of the model, or a null pointer.
 const Under* under(const Model&);
+/// Whether the model's base is all of it for some parameters.
+inline bool has_whole(const Model& model) { return under(model) && under(model)->record_whole; }
 /// Called by BRDFC_UNDER before main().
 bool register_under(const std::string& name, const Under&);
 
@@ -93,6 +104,11 @@ concept SamplesBesideUnder = requires(const M& m, const Vec3<double>& w) {
   m.sample_beside_under(w, w, 1.0);
 };
 
+template <class M>
+concept HasWhole = requires(const M& m) {
+  m.whole();
+};
+
 template <template <class> class M> Under under_of() {
   static const auto recorded = [](const ModelInfo& info, const ParamValues& fixed) {
     const ParamValues values = complete(info, fixed);
@@ -100,19 +116,26 @@ template <template <class> class M> Under under_of() {
     m.parameters(RecordVisitor{values, fixed});
     return m;
   };
+  static const auto bound = [](const ModelInfo& info, const ParamValues& given) {
+    const ParamValues values = complete(info, given);
+    M<double> m;
+    m.parameters(BindVisitor<double>{values});
+    return m;
+  };
   Under out{[](const ModelInfo& info, const ParamValues& fixed, const Vec3<Expr>& wo) {
               return recorded(info, fixed).under(wo);
             },
             [](const ModelInfo& info, const ParamValues& given, const Vec3<double>& wo) {
-              const ParamValues values = complete(info, given);
-              M<double> m;
-              m.parameters(BindVisitor<double>{values});
-              return m.under(wo);
+              return bound(info, given).under(wo);
             },
-            nullptr};
+            nullptr, nullptr, nullptr};
   if constexpr (SamplesBesideUnder<M<double>>)
     out.sample = [](const ModelInfo& info, const ParamValues& fixed, const Vec3<Expr>& wo, const Vec3<Expr>& u,
                     const Expr& stands) { return recorded(info, fixed).sample_beside_under(wo, u, stands); };
+  if constexpr (HasWhole<M<double>>) {
+    out.record_whole = [](const ModelInfo& info, const ParamValues& fixed) { return recorded(info, fixed).whole(); };
+    out.bound_whole = [](const ModelInfo& info, const ParamValues& given) { return bound(info, given).whole(); };
+  }
   return out;
 }
 

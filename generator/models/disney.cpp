@@ -11,7 +11,7 @@
 //     approximation of subsurface scattering after Hanrahan and Krueger,
 //   C = mix(0.08 specular mix(1, hue, specular_tint), color, metallic), C_sheen = mix(1, hue, sheen_tint),
 //   hue = color / (0.3 r + 0.6 g + 0.1 b), 1 if black,
-//   D_ggx: of model/ggx.h, with ax = max(0.001, roughness^2 / a), ay = max(0.001, roughness^2 a),
+//   D_ggx: of model/facets.h, with ax = max(0.001, roughness^2 / a), ay = max(0.001, roughness^2 a),
 //     a = sqrt(1 - 0.9 anisotropic),
 //   D_coat = (b^2 - 1) / (2 pi log(b) (1 + (b^2 - 1) (n.h)^2)), b = mix(0.1, 0.001, clearcoat_gloss),
 //   G_a = 1 / (((n.i) + S_i) ((n.o) + S_o)), S = sqrt(a^2 + (n.w)^2 - a^2 (n.w)^2): Smith's separable masking over
@@ -34,7 +34,7 @@
 // albedos.
 #include "model/base_terms.h"
 #include "model/burley.h"
-#include "model/ggx.h"
+#include "model/facets.h"
 #include "model/under.h"
 
 namespace brdfc {
@@ -83,9 +83,9 @@ template <class T> struct Disney {
                           "Facets that hide others. remapped: as in 2012; facets: as from 2014 on, and in Blender"});
   }
 
-  GgxFacets<T> highlight() const {
+  Facets<T> highlight() const {
     const T a = named("aspect", sqrt(T(1) - T(0.9) * anisotropic)), r2 = roughness * roughness;
-    return {named("ax", maximum(r2 / a, T(0.001))), named("ay", maximum(r2 * a, T(0.001)))};
+    return {named("ax", maximum(r2 / a, T(0.001))), named("ay", maximum(r2 * a, T(0.001))), false, false};
   }
   static Rgb<T> mix(const Rgb<T>& a, const Rgb<T>& b, const T& t) { return a + (b - a) * t; }
 
@@ -116,7 +116,7 @@ template <class T> struct Disney {
   }
   T remapped() const { return named("a", sqr(T(0.5) + roughness / T(2))); }
   /// G / (4 (n.i) (n.o)) of the highlight.
-  T shape(const GgxFacets<T>& g, const Vec3<T>& wi, const Vec3<T>& wo) const {
+  T shape(const Facets<T>& g, const Vec3<T>& wi, const Vec3<T>& wo) const {
     if (masking == Facets)
       return T(0.25) / maximum((maximum(wi.z, T(0)) + g.hidden(wi)) * (maximum(wo.z, T(0)) + g.hidden(wo)), tiny<T>());
     return masked(wi.z, remapped()) * masked(wo.z, remapped());
@@ -130,7 +130,7 @@ template <class T> struct Disney {
 
   Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
     const HalfVector<T> k(wi, wo);
-    const GgxFacets<T> g = highlight();
+    const Facets<T> g = highlight();
     const T F = named("F", pow5(k.one_minus_oh));
     Rgb<T> f = matte(F, wi, wo) + mix(C(), Rgb<T>(T(1)), F) * (g.D(k.h) * shape(g, wi, wo));
     const T coat = T(0.25) * clearcoat * D_coat(k.h) * (T(0.04) + T(0.96) * F);
@@ -149,7 +149,7 @@ template <class T> struct Disney {
 
   T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
     const HalfVector<T> k(wi, wo);
-    const GgxFacets<T> g = highlight();
+    const Facets<T> g = highlight();
     const auto [high, coat] = shares(wo);
     const T p = (T(1) - high - coat) * cosine_pdf(wi) +
                 high * g.D(k.h) / (T(4) * (maximum(wo.z, T(0)) + g.hidden(wo))) +
@@ -164,7 +164,7 @@ template <class T> struct Disney {
     const T sin2 = minimum(b2 * expm1(-u.y * log(b2)) / (T(1) - b2), T(1)), sine = sqrt(sin2);
     const T phi = T(2) * pi<T>() * u.z;
     const Vec3<T> of_coat = {sine * cos(phi), sine * sin(phi), sqrt(T(1) - sin2)};
-    const Vec3<T> h = select(u.x < coat, of_coat, highlight().sample_normal(wo, u.y, u.z));
+    const Vec3<T> h = select(u.x < coat, of_coat, highlight().sample_caps(wo, u.y, u.z));
     const Vec3<T> wi = select(u.x < high + coat, h * (T(2) * dot(wo, h)) - wo, sample_cosine(u.y, u.z));
     const T p = pdf(wi, wo);
     return sample_if(above(wi, wo), wi, eval(wi, wo) * (wi.z / maximum(p, tiny<T>())), p);
@@ -173,7 +173,7 @@ template <class T> struct Disney {
   /// The matte term, but for sheen and most of what subsurface scattering varies; and the highlight with the Fresnel
   /// term of the middle of its lobe.
   ClosureSum<T> base(const Vec3<T>& wo) const {
-    const GgxFacets<T> g = highlight();
+    const Facets<T> g = highlight();
     const T z = maximum(wo.z, tiny<T>()), hidden = g.hidden(wo);
     const Rgb<T> below = color * (T(1) - metallic);
     Closure<T> burley(ClosureKind::Burley, below * (T(1) - subsurface));
@@ -191,7 +191,7 @@ template <class T> struct Disney {
   /// Lambert's law, and the facets with their own masking. Separable masking is at least the correlated one over
   /// 1 + Lambda_o.
   ClosureSum<T> under(const Vec3<T>& wo) const {
-    const GgxFacets<T> g = highlight();
+    const Facets<T> g = highlight();
     const T z = maximum(wo.z, tiny<T>());
     const T least = (T(1) - subsurface) * least_burley_diffuse(roughness, wo) + subsurface * T(0.625);
     const Rgb<T> glossy = masking == Facets ? C() * (z / (z + g.hidden(wo))) : Rgb<T>(T(0));

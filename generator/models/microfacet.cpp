@@ -2,15 +2,8 @@
 // Microfacets composed of a distribution of normals, a masking function and a Fresnel term.
 //
 // B. Walter, S. Marschner, H. Li, K. Torrance: Microfacet Models for Refraction through Rough Surfaces, EGSR 2007:
-// f = F D G / (4 (n.i)(n.o)), eq. 20, with two roughnesses as in E. Heitz: Understanding the Masking-Shadowing Function
-// in Microfacet-Based BRDFs, JCGT 3(2), 2014. With the slopes x, y of the normal and s2 = (x / ax)^2 + (y / ay)^2,
-//   ggx:       D = 1 / (pi ax ay (n.h)^4 (1 + s2)^2), also named after Trowbridge and Reitz, 1975,
-//   beckmann:  D = exp(-s2) / (pi ax ay (n.h)^4);
-//   smith_correlated: G = 1 / (1 + Lambda_i + Lambda_o), Heitz eq. 99,
-//   smith_separable:  G = 1 / ((1 + Lambda_i) (1 + Lambda_o)),
-//   v_cavity:         Torrance and Sparrow's, of model/v_cavity.h.
-// With a = (n.w) / sqrt((ax w.x)^2 + (ay w.y)^2), Lambda is (sqrt(1 + 1 / a^2) - 1) / 2 for ggx. For beckmann it is
-// Walter's rational approximation of its sec. 5.2, off by less than 0.35 % of G, which Cycles uses as well.
+// f = F D G / (4 (n.i)(n.o)), eq. 20. Distributions, Smith's masking and the sampling of both: model/facets.h. The
+// masking v_cavity is Torrance and Sparrow's, of model/v_cavity.h.
 //
 // F is Schlick's approximation S with the reflectance f0, times a tint that is strongest at 82 degrees, where the
 // cosine is 1/7: P. Kutz, M. Hasan, D. Edmondson: Novel Aspects of the Adobe Standard Material, 2021. Their
@@ -29,16 +22,9 @@
 //   1 - E = m^(3/4) (1 - m) sum_ij c_ij (2 sqrt(m) - 1)^i (2 alpha - 1)^j,
 // fitted to quadratures of the largest relative error of E, which is 8e-4.
 //
-// Numerical stability. (n.w) Lambda is finite at the horizon, Lambda is not: the quotient G / (4 (n.i)(n.o)) is
-// computed from the former. With s = 7 (1 - c) / 6, q is 7 c s^6 and 1 - q is (1 - s)^2 (1 + 2 s + ... + 6 s^5).
-//
-// Sampling. Visible normals of Smith's ggx by spherical caps: J. Dupuy, A. Benyoub: Sampling Visible GGX Normals with
-// Spherical Caps, HPG 2023. Visible normals of V-cavities, which need nothing but D (n.h): a normal is drawn, and
-// itself or its opposite is taken, with probabilities as their projected areas (Heitz 2014, sec. 5.2; E. Heitz, E.
-// d'Eon: Importance Sampling Microfacet-Based BSDFs using the Distribution of Visible Normals, EGSR 2014). Smith's
-// beckmann takes these as well: its own need the inverse of an error function.
+// Numerical stability. With s = 7 (1 - c) / 6, q is 7 c s^6 and 1 - q is (1 - s)^2 (1 + 2 s + ... + 6 s^5).
 #include "model/base_terms.h"
-#include "model/ggx.h"
+#include "model/facets.h"
 #include "model/under.h"
 #include "model/v_cavity.h"
 
@@ -66,6 +52,7 @@ template <class T> struct Microfacet {
 
   enum { Ggx, Beckmann, MultiscatterGgx };
   enum { SmithCorrelated, SmithSeparable, VCavity };
+  static constexpr double kGrey = 1e-5;
 
   static ModelInfo info() {
     return {.name = "microfacet",
@@ -115,37 +102,13 @@ template <class T> struct Microfacet {
   /// The masking that counts.
   bool has_masking(int which) const { return (distribution == MultiscatterGgx ? SmithCorrelated : masking) == which; }
 
-  GgxFacets<T> ggx() const { return {ax, ay}; }
-
-  T D(const Vec3<T>& h) const {
-    if (!is_beckmann()) return ggx().D(h);
-    const Slopes<T> s(h);
-    return named("D", exp(-(sqr(s.x / ax) + sqr(s.y / ay))) * sqr(s.inverse_cos2()) / (pi<T>() * ax * ay));
-  }
-
-  /// (n.w) Lambda, for w above the surface.
-  T hidden(const Vec3<T>& w) const {
-    if (!is_beckmann()) return ggx().hidden(w);
-    const T c = maximum(w.z, tiny<T>()), p2 = named("p2", sqr(ax * w.x) + sqr(ay * w.y));
-    const T p = sqrt(p2), a = named("a", minimum(c / maximum(p, tiny<T>()), T(1.6)));
-    return select(a < T(1.6), p * (T(1) - a * (T(1.259) - T(0.396) * a)) / (T(3.535) + T(2.181) * a), T(0));
-  }
+  Facets<T> surface() const { return {ax, ay, is_beckmann(), has_masking(VCavity) || is_beckmann()}; }
 
   /// G / (4 (n.i)(n.o)).
   T shape(const HalfVector<T>& k, const Vec3<T>& wi, const Vec3<T>& wo) const {
     if (has_masking(VCavity)) return v_cavity_shape(k, wi, wo) / T(4);
-    const T zi = maximum(wi.z, T(0)), zo = maximum(wo.z, T(0)), hi = hidden(wi), ho = hidden(wo);
-    const T product = has_masking(SmithCorrelated) ? zi * zo + zi * ho + zo * hi : (zi + hi) * (zo + ho);
-    return T(1) / (T(4) * maximum(product, tiny<T>()));
+    return surface().smith_shape(has_masking(SmithCorrelated), wi, wo);
   }
-
-  /// The density of visible normals over D, times the Jacobian of reflection.
-  T visible(const HalfVector<T>& k, const Vec3<T>& wo) const {
-    if (folds()) return minimum(T(1) / maximum(wo.z, tiny<T>()), T(2) * k.h.z / k.oh) / T(4);
-    return T(1) / (T(4) * (maximum(wo.z, T(0)) + hidden(wo)));
-  }
-  /// True if sampled normals are those that V-cavities show.
-  bool folds() const { return has_masking(VCavity) || is_beckmann(); }
 
   /// Of 1 - (o.h).
   Rgb<T> F(const T& one_minus_oh) const {
@@ -156,9 +119,9 @@ template <class T> struct Microfacet {
     return named("F", (f0 + (Rgb<T>(T(1)) - f0) * pow5(one_minus_oh)) * (Rgb<T>(untinted) + tint * q));
   }
 
-  /// The factor by which interreflection raises f.
-  Rgb<T> compensation(const Vec3<T>& wo) const {
-    if (distribution != MultiscatterGgx) return Rgb<T>(T(1));
+  /// (1 - E) / E: what interreflection of the share 1 adds to f, over f.
+  T gain(const Vec3<T>& wo) const {
+    if (distribution != MultiscatterGgx) return T(0);
     const T alpha = named("alpha", sqrt(ax * ay)), z = maximum(wo.z, T(0)), m = named("m", z / (z + alpha));
     const T root = sqrt(m), x = named("x", T(2) * root - T(1)), y = named("y", T(2) * alpha - T(1));
     T sum(0);
@@ -168,35 +131,31 @@ template <class T> struct Microfacet {
       sum = sum * x + row;
     }
     const T lost = named("lost", root * sqrt(root) * (T(1) - m) * sum);
-    return named("compensation", Rgb<T>(T(1)) + again * (lost / (T(1) - lost)));
+    return named("gain", lost / (T(1) - lost));
+  }
+  /// The factor by which interreflection raises f.
+  Rgb<T> compensation(const Vec3<T>& wo) const {
+    if (distribution != MultiscatterGgx) return Rgb<T>(T(1));
+    return named("compensation", Rgb<T>(T(1)) + again * gain(wo));
   }
 
   Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
     const HalfVector<T> k(wi, wo);
-    return F(k.one_minus_oh) * compensation(wo) * select(above(wi, wo), D(k.h) * shape(k, wi, wo), T(0));
+    return F(k.one_minus_oh) * compensation(wo) * select(above(wi, wo), surface().D(k.h) * shape(k, wi, wo), T(0));
   }
 
   T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
     const HalfVector<T> k(wi, wo);
-    return select(above(wi, wo), D(k.h) * visible(k, wo), T(0));
-  }
-
-  Vec3<T> sample_normal(const Vec3<T>& wo, const Vec3<T>& u) const {
-    if (!folds()) return ggx().sample_normal(wo, u.y, u.z);
-    const Vec3<T> up = {T(0), T(0), T(1)};
-    const Vec3<T> h = !is_beckmann() ? ggx().sample_normal(up, u.y, u.z) : sample_gaussian_slopes(ax, ay, u.y, u.z);
-    const Vec3<T> opposite = {-h.x, -h.y, h.z};
-    const T one = maximum(dot(wo, h), T(0)), other = maximum(dot(wo, opposite), T(0));
-    return select(u.x * (one + other) < one, h, opposite);
+    return select(above(wi, wo), surface().D(k.h) * surface().visible(k.h.z, k.oh, wo), T(0));
   }
 
   Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
-    const Vec3<T> h = sample_normal(wo, u);
+    const Vec3<T> h = surface().sample_normal(wo, u).h;
     const Vec3<T> wi = h * (T(2) * dot(wo, h)) - wo;
     const HalfVector<T> k(wi, wo);
-    const T v = visible(k, wo);
+    const T v = surface().visible(k.h.z, k.oh, wo);
     const T weight = shape(k, wi, wo) * maximum(wi.z, T(0)) / maximum(v, tiny<T>());
-    return sample_if(above(wi, wo), wi, F(k.one_minus_oh) * compensation(wo) * weight, D(k.h) * v);
+    return sample_if(above(wi, wo), wi, F(k.one_minus_oh) * compensation(wo) * weight, surface().D(k.h) * v);
   }
 
   /// The same microfacets, with the Fresnel term at the middle of the lobe. Cycles has one closure for each
@@ -208,19 +167,58 @@ template <class T> struct Microfacet {
     Rgb<T> weight = F(clamp01(T(1) - height)) * compensation(wo);
     if (has_masking(SmithSeparable)) {
       // (1 + 2 Lambda) / (1 + Lambda)^2 of the mirrored view, whose light is that of wo.
-      const T z = maximum(wo.z, tiny<T>()), h = hidden(wo);
+      const T z = maximum(wo.z, tiny<T>()), h = surface().hidden(wo);
       weight = weight * (z / (z + h) * ((z + T(2) * h) / (z + h)));
     }
     return {facets(ClosureKind::Ggx, is_beckmann() ? none : weight, ax, ay, T(0)),
             facets(ClosureKind::Beckmann, is_beckmann() ? weight : none, ax, ay, T(0))};
   }
 
-  /// Cycles' closures, if the masking is theirs, with the least F: S is at least f0, and q at most 1.
+  /// Cycles' closures, if the masking is theirs.
+  ///
+  /// Metal has the F of Kutz and others. With b = S(1/7) it is S - (1 - tint) b q, which is not above this F,
+  /// S - (1 - tint) S q, as long as S is at most b: where facets are seen at 82 degrees or less. Light comes from
+  /// within 90 degrees of the normal, so all facets are, seen from a cosine of kSteep or more. From below, the tint of
+  /// the metal is 1 - (1 - tint) / b, which makes it darker than this F for S up to 1. The grey part of interreflection
+  /// is a second metal. The colour of interreflection, and facets that the closure can't stretch so far, have the least
+  /// F: S is at least f0, and q at most 1.
   ClosureSum<T> under(const Vec3<T>& wo) const {
-    const Rgb<T> least = f0 * tint * compensation(wo), none(T(0));
-    const auto weight = [&](bool is_this) { return is_this && has_masking(SmithCorrelated) ? least : none; };
-    return {facets(ClosureKind::Ggx, weight(!is_beckmann()), ax, ay, T(0)),
-            facets(ClosureKind::Beckmann, weight(is_beckmann()), ax, ay, T(0))};
+    constexpr double kSteep = 0.2829;  // cos(2 acos(1/7) - 90 degrees)
+    const Rgb<T> one(T(1)), none(T(0)), least = f0 * tint;
+    const bool smith = has_masking(SmithCorrelated);
+    // Without a tint Cycles, which multiplies the two conditions, does not have to compare the view.
+    const auto grazing = wo.z < T(kSteep) && T(0) < max_component(one - tint);
+    const Rgb<T> edge = select(grazing, one - (one - tint) / fresnel_at_82(f0), tint);
+    const T is_metal = select(T(kLeastAspect) <= aspect() && max_component(one - edge) <= T(1), T(1), T(0));
+    const bool is_again = smith && distribution == MultiscatterGgx;
+    const T more = is_again ? is_metal * minimum(grey_again() * gain(wo), T(1)) : T(0);
+    const auto metal = [&](ClosureKind kind, const T& weight) {
+      Closure<T> c = facets(kind, Rgb<T>(weight), ax, ay, T(0));
+      c.metal = true;
+      c.f0 = f0;
+      c.edge = edge;
+      return c;
+    };
+    const auto rest = [&](ClosureKind kind, bool is_this) {
+      const Rgb<T> left = compensation(wo) - Rgb<T>(is_metal + more);
+      return facets(kind, smith && is_this ? least * left : none, ax, ay, T(0));
+    };
+    return {metal(ClosureKind::Ggx, smith && !is_beckmann() ? is_metal : T(0)),
+            metal(ClosureKind::Beckmann, smith && is_beckmann() ? is_metal : T(0)), metal(ClosureKind::Ggx, more),
+            rest(ClosureKind::Ggx, !is_beckmann()), rest(ClosureKind::Beckmann, is_beckmann())};
+  }
+  T aspect() const { return minimum(ax, ay) / maximum(ax, ay); }
+  /// The least channel, with rounding. Where no channel is above it by kGrey, interreflection is grey.
+  T grey_again() const { return T(1) - max_component(Rgb<T>(T(1)) - again); }
+
+  /// With a white tint F is Schlick's. gain() is 2.27 at most, and 1 for alpha up to 0.7.
+  T whole() const {
+    if (!has_masking(SmithCorrelated)) return T(0);
+    auto stands = max_component(Rgb<T>(T(1)) - tint) <= T(0) && T(kLeastAspect) <= aspect();
+    if (distribution == MultiscatterGgx)
+      stands =
+          stands && max_component(again) <= grey_again() + T(kGrey) && (grey_again() <= T(0.44) || ax * ay <= T(0.49));
+    return select(stands, T(1), T(0));
   }
 };
 

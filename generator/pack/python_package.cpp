@@ -88,10 +88,10 @@ class NumpyFunctions {
     std::string suffix;
     for (const std::string& option : options_of(model_.info(), choices)) suffix += "_" + option;
     const RecordedModel recorded = record_model(model_, choices, Precision::Double);
-    const std::array<std::string, 5> names = {
-        function("eval", suffix, recorded.eval, {"wi", "wo"}), function("pdf", suffix, recorded.pdf, {"wi", "wo"}),
+    const std::array<std::string, 6> names = {
+        function("eval", suffix, recorded.eval, {"wi", "wo"}),    function("pdf", suffix, recorded.pdf, {"wi", "wo"}),
         function("sample", suffix, recorded.sample, {"wo", "u"}), function("mirror", suffix, recorded.mirror, {"wo"}),
-        function("transmit", suffix, recorded.transmit, {"wo"})};
+        function("transmit", suffix, recorded.transmit, {"wo"}),  function("whole", suffix, recorded.whole, {})};
     return fmt::format("Formulas({})", fmt::join(names, ", "));
   }
 

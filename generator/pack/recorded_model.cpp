@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "pack/recorded_model.h"
 
+#include "model/under.h"
+
 namespace brdfc::pack {
 
 RecordedModel record_model(const Model& model, const Choices& choices, Precision precision) {
@@ -25,6 +27,8 @@ RecordedModel record_model(const Model& model, const Choices& choices, Precision
   }
   Rgb<Expr> transmittance;
   if (model.has_medium()) transmittance = brdf->transmittance(Expr::input("distance"));
+  Expr stands(0);
+  if (has_whole(model)) stands = under(model)->record_whole(model.info(), with_choices(model.info(), choices));
   RecordedModel out;
   if (model.has_scatter()) {
     out.eval.output("f", f);
@@ -38,6 +42,7 @@ RecordedModel record_model(const Model& model, const Choices& choices, Precision
     out.transmit.output("weight", refracted);
     out.iors.output("iors", iors);
   }
+  if (has_whole(model)) out.whole.output("stands", stands);
   if (model.has_medium()) out.inside.output("transmittance", transmittance);
   return out;
 }

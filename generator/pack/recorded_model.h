@@ -18,6 +18,7 @@ struct RecordedModel {
   Program transmit;  ///< weight, likewise
   Program iors;      ///< iors, of ideal refraction for red, green and blue
   Program inside;    ///< transmittance, of the input `distance`
+  Program whole;     ///< stands, of the parameters alone: 1 where one of Cycles' closures equals the model, else 0
 };
 RecordedModel record_model(const Model&, const Choices&, Precision);
 

@@ -19,15 +19,15 @@ constexpr const char* kOslWords = R"(
 
   Ci I N Ng Oi P Ps dPdtime dPdu dPdv dtime time u v
 
-  abs atan backfacing burley_diffuse_bsdf cbrt clamp cos diffuse_ramp dot emission exp getattribute glossy_toon isfinite log max
-  microfacet min normalize oren_nayar_diffuse_bsdf phong_ramp pow raytype reflect reflection refraction sin sqrt
+  abs atan backfacing burley_diffuse_bsdf cbrt clamp cos diffuse_ramp dot emission exp generalized_schlick_bsdf getattribute glossy_toon
+  isfinite log max microfacet min normalize oren_nayar_diffuse_bsdf phong_ramp pow raytype reflect reflection refraction sin sqrt
 
   area ceil cross distance floor hypot length mix mod noise rotate round sign smoothstep step transform
 
   Albedo BSDF Normal Shown Tangent
 
   entry first frame_b frame_n frame_t last mirror_rise mirror_weight path_length ray shading_n show side
-  shown_f shown_pdf shown_weight shown_x shown_y shown_z sum u_all weight wi wi_x wi_y wi_z wo wo_x wo_y wo_z
+  shown_f shown_pdf shown_weight shown_x shown_y shown_z sum u_all weight whole wi wi_x wi_y wi_z wo wo_x wo_y wo_z
 
   across_here aimed along_here any_beam any_flat any_spot beam beam_blend beam_edge beam_here centre_here chosen
   chosen_extent chosen_towards covered covered_before density_under disk_here drawn_density drawn_x drawn_y drawn_z
@@ -45,7 +45,7 @@ constexpr const char* kOslWords = R"(
 /// Prefixes of numbered names.
 constexpr const char* kNumbered =
     "albedo alpha alpha_across exponent ior knots normal position ramp roughness size smooth table table_b table_g "
-    "table_r tangent u v weight";
+    "table_r tangent u v weight whole_across whole_alpha whole_f0 whole_stands";
 
 std::set<std::string> split(const char* text) {
   std::istringstream in(text);

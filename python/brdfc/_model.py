@@ -101,6 +101,8 @@ class Formulas(NamedTuple):
     sample: Callable[..., Any] | None
     mirror: Callable[..., Any] | None
     transmit: Callable[..., Any] | None
+    #: 1 where one of Cycles' closures equals the model, of parameters alone.
+    whole: Callable[..., Any] | None
 
 
 class Model:
@@ -207,6 +209,24 @@ class Model:
         return total + self.sample(wo[..., None, :], sequence(samples), **inner).weight.mean(
             axis=-2
         )
+
+    def is_closure(self, parameters: Mapping[str, ArrayLike | None]) -> bool:
+        """Whether one of Cycles' closures equals the model at these values, one of each parameter.
+        None stands for a value that is not known: if it matters, the answer is False."""
+        known = {name: value for name, value in parameters.items() if value is not None}
+        choices = (name for name, p in self.parameters.items() if isinstance(p, Choice))
+        if any(parameters.get(name, "") is None for name in choices):
+            return False
+        chosen, values = self._bind(known)
+        formula = self.formulas[chosen].whole
+        if formula is None:
+            return False
+        arguments = []
+        for name, value in values.items():
+            value = value[:, None] if isinstance(self.parameters[name], Color) else value[()]
+            arguments.append(value * np.nan if parameters.get(name, 0) is None else value)
+        with np.errstate(invalid="ignore"):
+            return bool(np.all(np.asarray(formula(NUMPY, *arguments)) > 0))
 
     def on(self, namespace: ModuleType) -> ArrayModel:
         """The model on arrays of another library: jax.numpy, torch, or one that follows the array

@@ -128,7 +128,7 @@ def test_several_models_as_formula_nodes_are_not_black(extension, cpu, models, r
     255 numbers at a time."""
     cpu.cycles.shading_system, cpu.cycles.samples = False, 64
     helpers.add_camera(cpu)
-    names = ("schlick", "microfacet", "ashikhmin_shirley")[: models - 1]
+    names = ("schlick", "cook_torrance", "ashikhmin_shirley")[: models - 1]
     material = mix_of(extension, cpu, "ward", others=names)
     put(cpu, material)
     for index in range(8):
@@ -140,6 +140,29 @@ def test_several_models_as_formula_nodes_are_not_black(extension, cpu, models, r
     cpu.render.resolution_x = cpu.render.resolution_y = 16
     centre = helpers.render(cpu)[6:10, 6:10, :3]
     assert centre.mean() > 0.1  # parts of the ball are dark, under lamps alone
+
+
+@pytest.mark.parametrize("osl", [False, True], ids=["nodes", "aimed"])
+def test_a_closure_of_cycles_takes_no_room_of_lamps(extension, cpu, osl):
+    """A metal that Blender has aims at nothing, so it leaves others of the file, and a second model
+    in its material, all lamps."""
+    cpu.cycles.shading_system = osl
+    slots = import_module(f"{extension.package}.warnings.closure_slots")
+    metal = extension.api.new_material("microfacet")
+    (node,) = extension.model_nodes.group_nodes(metal)
+    sockets = extension.model_nodes.sockets(node)
+    assert slots.of_material(metal) == slots.ClosureUsage(3, 0, 0)
+    both = extension.api.new_sum([("ward", {}), ("microfacet", {})])
+    assert slots.of_material(both).lamps() == 8
+    sockets["tint"].default_value = (0.9, 1.0, 1.0, 1.0)
+    assert slots.of_material(metal).lamps() == 8
+    sockets["tint"].default_value = (1.0, 1.0, 1.0, 1.0)
+    assert slots.of_material(metal).lamps() is None
+    color = metal.node_tree.nodes.new("ShaderNodeRGB")
+    metal.node_tree.links.new(color.outputs[0], sockets["f0"])
+    assert slots.of_material(metal).lamps() is None
+    metal.node_tree.links.new(color.outputs[0], sockets["tint"])
+    assert slots.of_material(metal).lamps() == (8 if osl else 4)
 
 
 # ---- numbers on SVM's stack ----------------------------------------------------------------------
@@ -159,6 +182,7 @@ LARGEST = {"factors", "microfacet", "phong_material", "radziszewski_alda"}
     [
         ("largest", 8, False),
         ("factors", 8, True),
+        ("microfacet", 8, True),
         pytest.param("all", 8, False, marks=pytest.mark.long),
         pytest.param("all", 4, False, marks=pytest.mark.long),
         pytest.param("all but factors", 8, True, marks=pytest.mark.long),
@@ -173,9 +197,8 @@ def test_models_fit_the_stack(extension, empty, tmp_path, which, count, linked):
     names = {
         "all": every,
         "all but factors": every - {"factors"},
-        "factors": {"factors"},
         "largest": LARGEST,
-    }[which]
+    }.get(which, {which})
     empty.render.engine, empty.cycles.shading_system = "CYCLES", False
     empty.cycles.samples = 1
     empty.render.resolution_x = empty.render.resolution_y = 8

@@ -246,8 +246,10 @@ def test_a_picture_of_plastic_is_as_before(extension, convert, empty, normal, ro
     assert convert.apply([plan]) == 1
     after = flat(empty, material)
     print(f"{before} and {after}")
-    # Bent back, the normal is at 45 degrees, where the polynomial in two numbers is less exact.
-    worst = 0.05 if normal[1] > 0 and roughness == "linked" else 0.02
+    # Bent back, the normal is at 45 degrees. Only the layer is left there, whose Fresnel term is
+    # Schlick's; and the polynomial in two numbers is less exact.
+    away = 0.065 if roughness == "linked" else 0.025
+    worst = away if normal[1] > 0 else 0.02
     for x, y in zip(before, after, strict=True):
         assert y == pytest.approx(x, rel=worst)
     assert convert.restore(material) == 1
@@ -878,7 +880,7 @@ REFUSED = [
     ("principled", {"Coat_Weight": 0.5}, "it has Coat"),
     ("principled", {"Transmission_Weight": 0.9}, "it has Transmission"),
     ("principled", {"Transmission_Weight": 1.0, "Metallic": 0.5}, "it has Transmission"),
-    ("principled", {"Transmission_Weight": 1.0}, "no model is of rough glass"),
+    ("principled", {"Transmission_Weight": 1.0}, "the model of rough glass is darker under lamps"),
     (
         "principled",
         {"Transmission_Weight": 1.0, "Roughness": 0.0, "Specular_IOR_Level": 0.4},
@@ -890,7 +892,7 @@ REFUSED = [
         "it has Coat",
     ),
     ("principled", {"Subsurface_Weight": 0.2}, "it has Subsurface"),
-    ("glass", {"Roughness": 0.3}, "no model is of rough glass"),
+    ("glass", {"Roughness": 0.3}, "the model of rough glass is darker under lamps"),
     ("glass", {"Color": (2.0, 1.0, 1.0)}, "Tint of Fresnel Dielectric would be 2, and may be 0 to"),
     # Values outside the range of a model, or of what Blender's formulas are taken for.
     ("glass", {"IOR": 0.0}, "IOR of Fresnel Dielectric would be 0, and may be 0.1 to 10"),

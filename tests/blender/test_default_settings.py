@@ -87,7 +87,7 @@ def test_every_model_in_a_new_file(extension, new_file, few_of):
     In a new file, with its lamp, world and settings, the form without Open Shading Language is
     compared with the one with it, which is known to match the reference renderer: means of balls,
     and blocks of pixels within the noise."""
-    models = few_of(extension.api.models(), 6)
+    models = [m for m in few_of(extension.api.models(), 6) if native(extension, m)]
     materials = [extension.api.new_material(model) for model in models]
     few_samples(new_file, 24)
     gallery(new_file, materials)
@@ -120,6 +120,23 @@ def test_every_model_in_a_new_file(extension, new_file, few_of):
         # differ by 1 to 26 %.
         allowed = noise[lit].sum() + lit.sum() * (5e-3 * on.mean()) ** 2
         assert apart.sum() / allowed < 3.5, f"{model}: blocks {apart.sum() / allowed:.2f}"
+
+
+def test_rough_glass_in_a_new_file_is_a_node_of_blender_and_says_so(extension, new_file):
+    """No node sends rays through a surface in a direction of its own."""
+    material = extension.api.new_material("rough_glass", alpha=0.09)
+    update(new_file)
+    assert native(extension, "rough_glass") is None
+    (found,) = extension.api.warnings(material, new_file)
+    assert found.code == "osl_off"
+    assert "Blender's own nodes stand in" in found.message
+    (node,) = extension.model_nodes.group_nodes(material)
+    (glass,) = [n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeBsdfGlass"]
+    assert glass.distribution == "GGX"
+    assert glass.inputs["Roughness"].links[0].from_node.operation == "SQRT"
+    new_file.cycles.shading_system = True
+    update(new_file)
+    assert extension.api.warnings(material, new_file) == []
 
 
 def state(tree):

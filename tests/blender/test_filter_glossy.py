@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cycles' Filter Glossy blurs Blender's nodes and Formula Nodes, and not shaders in Open Shading
-Language: what Convert says of it is what pictures show."""
+"""Cycles' Filter Glossy blurs Blender's nodes and Formula Nodes, and shaders in Open Shading
+Language only where they are one of Cycles' closures: what Convert says of it is what pictures
+show."""
 
 import bpy
 import helpers
@@ -11,23 +12,26 @@ from converting import material_of, only
 WHITE, BLACK = (0.8, 0.8, 0.8), (0.05, 0.05, 0.05)
 
 
-def metal(roughness):
-    return "principled", {"Metallic": 1.0, "Roughness": roughness, "Base_Color": WHITE}
+def metal(roughness, tint=1.0):
+    look = {"Roughness": roughness, "Base_Color": WHITE, "Specular_Tint": (tint,) * 3}
+    return "principled", {"Metallic": 1.0} | look
 
 
-def plastic(roughness):
-    return "principled", {"Roughness": roughness, "Base_Color": BLACK}
+def plastic(roughness, ior=1.5):
+    return "principled", {"Roughness": roughness, "Base_Color": BLACK, "IOR": ior}
 
 
 #: Node, and whether the picture changes by more than 1 %.
 CASES = [
-    (metal(0.1), True),
-    (metal(0.6), True),
+    (metal(0.1), False),  # its model is the same closure
+    (metal(0.1, 0.95), True),
+    (metal(0.6, 0.95), True),
     (metal(0.7), False),
     (metal(0.0), False),  # its model is a mirror, too
-    (plastic(0.3), True),
+    (plastic(0.3), False),  # as the metal of 0.1
+    (plastic(0.3, 2.5), True),
     (plastic(0.5), False),
-    (("glossy", {"Roughness": 0.4, "Color": WHITE}), True),
+    (("glossy", {"Roughness": 0.4, "Color": WHITE}), False),
     (("diffuse", {"Roughness": 0.4, "Color": WHITE}), False),
 ]
 
@@ -88,7 +92,7 @@ def test_convert_says_whether_the_setting_shows(extension, convert, empty, node,
 
 
 def test_the_warning_is_of_what_is_converted_with_the_setting(extension, convert, empty):
-    kind, inputs = metal(0.1)
+    kind, inputs = metal(0.1, 0.95)
     material, node = material_of(kind, "GGX", **inputs)
     ask = extension.api.conversion_warning
     plans = extension.api.plan_conversion([material])
@@ -108,7 +112,7 @@ def test_the_warning_is_of_what_is_converted_with_the_setting(extension, convert
 
 
 def test_the_button_reports_it(extension, convert, empty):
-    kind, inputs = metal(0.1)
+    kind, inputs = metal(0.1, 0.95)
     ball = helpers.add_sphere(empty, material_of(kind, "GGX", **inputs)[0])
     ball.select_set(True)
     extension.api.enable_osl(empty)

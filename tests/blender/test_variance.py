@@ -24,6 +24,8 @@ CASES = with_every_model(
     ("ashikhmin_shirley", {}),
     ("coupled", {"r0": 0.1, "rm": (1.0, 0.5, 0.1)}),
     ("coupled", {"r0": 0.1, "fresnel": "dielectric"}),
+    # With its default, nearly all weights are 1.
+    ("rough_glass", {"alpha": 0.8, "masking": "smith_separable"}),
     ("schlick", {}),
     ("schlick", {"rough": 0.7, "p": 0.4, "r": (0.9, 0.5, 0.1)}),
     ("ward", {}),

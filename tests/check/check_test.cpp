@@ -11,7 +11,6 @@
 #include "measure/albedo.h"
 #include "measure/bound_model.h"
 #include "measure/tabulate_albedo.h"
-#include "rough_dielectric.h"
 #include "support.h"
 
 namespace brdfc::check {
@@ -62,15 +61,6 @@ Row row_of(const Model& model, const std::string& check) {
 
 TEST(Checks, PassARightModel) {
   for (const auto& [check, passed] : outcome<kNone>()) EXPECT_TRUE(passed) << check;
-}
-/// Its lobe is chosen depending on the sampled half vector, and it transmits light.
-TEST(Checks, PassARoughDielectric) {
-  const detail::ModelOf<testing_models::RoughDielectric> model;
-  for (const Row& r : check_model(model, {.effort = 0.2}))
-    EXPECT_NE(r.result, Result::Failed) << r.check << ": " << r.worst << ", limit " << r.limit << " at " << r.where;
-  require_vital(model);
-  const measure::AlbedoTable table = measure::tabulate_albedo(model);
-  EXPECT_LT(table.error, 0.05);
 }
 TEST(Checks, AreSkippedWhereNoCaseCouldBeJudged) {
   const detail::ModelOf<Lost> model;

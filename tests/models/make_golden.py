@@ -907,6 +907,142 @@ def ward_albedo(p, cos_o):
     return [k * a for k in p["ks"]]
 
 
+# ---- Rough glass: Walter et al. 2007, eqs. 13, 16, 20, 21 ----------------------------------------
+
+
+def glass_indices(p, wo):
+    """The indices on the side of the viewer and on the other one."""
+    off = mp.mpf(p["ior"]) - 1
+    least = mp.mpf("0.001")
+    inside = 1 + (off if abs(off) > least else (-least if off < 0 else least))
+    return (1, inside) if wo[2] > 0 else (inside, 1)
+
+
+def glass_parts(p, wi, wo):
+    """The share of Fresnel's equations, the Jacobian, h, o.h and the tint; None where the facet's
+    sides are not those of the surface."""
+    i, o = vec(wi), vec(wo)
+    near, far = glass_indices(p, o)
+    if i[2] * o[2] > 0:
+        h, tint = unit([a + b for a, b in zip(i, o, strict=True)]), "reflected"
+    else:
+        h, tint = unit([-(near * a + far * b) for a, b in zip(o, i, strict=True)]), "refracted"
+    h = [c * (-1 if h[2] * o[2] < 0 else 1) for c in h]  # on the viewer's side
+    oh, ih = dot(o, h), dot(i, h)
+    if oh <= 0 or (ih > 0) != (i[2] * o[2] > 0):
+        return None
+    eta = far / mp.mpf(near)
+    total = eta**2 - 1 + oh**2 <= 0
+    mirror = mp.mpf(1) if total else fresnel(oh, eta)
+    if tint == "reflected":
+        return mirror, 1 / (4 * oh), h, oh, p[tint]
+    return 1 - mirror, far**2 * abs(ih) / (near * oh + far * ih) ** 2, h, oh, p[tint]
+
+
+def glass_masking(p, i, o):
+    a, b = (micro_lambda(p, [w[0], w[1], abs(w[2])]) for w in (i, o))
+    return 1 / (1 + a + b) if p["masking"] == "smith_correlated" else 1 / ((1 + a) * (1 + b))
+
+
+def glass_f(p, wi, wo):
+    p = {**p, "ax": p["alpha"], "ay": p["alpha"]}
+    i, o = vec(wi), vec(wo)
+    found = glass_parts(p, wi, wo)
+    if not found:
+        return [mp.mpf(0)] * 3
+    share, jacobian, h, oh, tint = found
+    f = share * jacobian * micro_d(p, h) * glass_masking(p, i, o) * oh / abs(i[2] * o[2])
+    return [f * c for c in tint]
+
+
+def glass_pdf(p, wi, wo):
+    """Visible normals of Smith's, for Beckmann of V-cavities; the event with its probability."""
+    p = {**p, "ax": p["alpha"], "ay": p["alpha"]}
+    o = vec(wo)
+    found = glass_parts(p, wi, wo)
+    if not found:
+        return mp.mpf(0)
+    share, jacobian, h, oh, _ = found
+    up = abs(o[2])
+    smith = p["distribution"] == "ggx"
+    g1 = 1 / (1 + micro_lambda(p, [o[0], o[1], up])) if smith else min(1, 2 * abs(h[2]) * up / oh)
+    return share * jacobian * micro_d(p, h) * g1 * oh / up
+
+
+def glass_albedo(p, cos_o):
+    """The error falls with the square of the number of steps."""
+    coarse, fine = (glass_sums(p, cos_o, steps) for steps in (1000, 2000))
+    return [(4 * b - a) / 3 for a, b in zip(coarse, fine, strict=True)]
+
+
+def glass_sums(p, cos_o, steps):
+    """Integrated over half vectors by their polar angle about the view, on which the Fresnel
+    equations depend, and azimuth: by midpoints in numbers that are denser where roots begin."""
+    near, far = (float(n) for n in glass_indices(p, (0, 0, cos_o)))
+    n, up, alpha = far / near, abs(cos_o), p["alpha"]
+    across = math.sqrt(1 - up * up)
+    t = (np.arange(steps) + 0.5) / steps
+    place, density = t * t * (3 - 2 * t), 6 * t * (1 - t) / steps
+
+    def smith(z):
+        t2 = alpha**2 * (1 / z**2 - 1)
+        if p["distribution"] == "ggx":
+            return (np.sqrt(1 + t2) - 1) / 2
+        a = 1 / np.sqrt(np.maximum(t2, 1e-300))
+        fit = (1 - 1.259 * a + 0.396 * a * a) / (3.535 * a + 2.181 * a * a)
+        return np.where(a < 1.6, fit, 0)
+
+    def leaving(z):
+        """G where the light leaves on its side at this height, else 0."""
+        b, c = smith(np.where(z > 0, z, 1)), smith(up)
+        both = 1 / (1 + b + c) if p["masking"] == "smith_correlated" else 1 / ((1 + b) * (1 + c))
+        return np.where(z > 0, both, 0)
+
+    # Total reflection ends at the first of these; below the second, not all azimuths are upward.
+    critical = math.sqrt(max(1 - n * n, 0))
+    ends = sorted({0.0, critical, across, 1.0})
+    back = on = 0.0
+    for a, b in zip(ends, ends[1:], strict=False):
+        c = (a + (b - a) * place)[:, None]
+        sine = np.sqrt(1 - c * c)
+        last = np.arccos(np.clip(-c * up / np.maximum(sine * across, 1e-300), -1, 1))
+        hz = c * up + sine * across * np.cos(last * place)
+        slope2 = (1 / np.maximum(hz, 1e-300) ** 2 - 1) / alpha**2
+        d = 1 / (math.pi * alpha**2 * hz**4)
+        d = d / (1 + slope2) ** 2 if p["distribution"] == "ggx" else d * np.exp(-slope2)
+        facets = 2 * (b - a) * density[:, None] * last * density * d * c / up
+        g2 = n * n - 1 + c * c
+        g = np.sqrt(np.maximum(g2, 0))
+        mirror = ((c - g) / (c + g)) ** 2 + ((n * n * c - g) / (n * n * c + g)) ** 2
+        mirror = np.where(g2 > 0, mirror / 2, 1)
+        back += float(np.sum(facets * mirror * leaving(2 * c * hz - up)))
+        on += float(np.sum(facets * (1 - mirror) * leaving((up - (c - g) * hz) / n)))
+    return [r * back + t * on for r, t in zip(p["reflected"], p["refracted"], strict=True)]
+
+
+def glass_pair(p, wi, wo, rng):
+    """Two pairs of three are of light that passes; the facet is near the surface's slope."""
+    if rng.random() < 1 / 3:
+        side = rng.choice((-1, 1))
+        return tuple(c * s for c, s in zip(wi, (1, 1, side), strict=True)), tuple(
+            c * s for c, s in zip(wo, (1, 1, side), strict=True)
+        )
+    wo = (*wo[:2], wo[2] * rng.choice((-1, 1)))
+    near, far = (float(n) for n in glass_indices(p, wo))
+    side = math.copysign(1, wo[2])
+    h = [2 * p["alpha"] * wi[0], 2 * p["alpha"] * wi[1], side]
+    size = math.sqrt(sum(c * c for c in h))
+    h = [c / size for c in h]
+    oh = sum(a * b for a, b in zip(h, wo, strict=True))
+    n = far / near
+    if oh <= 0 or n * n - 1 + oh * oh <= 0:
+        return (*wi[:2], wi[2] * side), wo
+    g = math.sqrt(n * n - 1 + oh * oh)
+    wi = [(a * (oh - g) - b) / n for a, b in zip(h, wo, strict=True)]
+    size = math.sqrt(sum(c * c for c in wi))
+    return tuple(c / size for c in wi), wo
+
+
 # ---- Curves of microfacet factors --------------------------------------------------------------
 
 D_KNOTS = (0, 0.3, 0.6, 0.9, 1.25, 1.65, 2.1, 2.6, 3.2, 4, 5, 6.5, 8.5, 11)
@@ -1773,6 +1909,39 @@ MODELS = {
         ],
         cosines=[1, 0.5, 0.1],
     ),
+    "rough_glass": dict(
+        f=glass_f,
+        pdf=glass_pdf,
+        albedo=glass_albedo,
+        pair=glass_pair,
+        defaults={
+            "alpha": 0.1,
+            "ior": 1.5,
+            "distribution": "ggx",
+            "masking": "smith_correlated",
+            "refracted": (1, 1, 1),
+            "reflected": (1, 1, 1),
+        },
+        cases=[
+            {},
+            {"alpha": 0.5, "ior": 1.33, "refracted": (0.9, 0.5, 0), "reflected": (0.2, 0.5, 1)},
+            {"alpha": 1, "masking": "smith_separable", "ior": 2.4},
+            {"distribution": "beckmann", "alpha": 0.3},
+            {"distribution": "beckmann", "masking": "smith_separable", "alpha": 1, "ior": 0.75},
+            {"ior": 1.01},
+            {"ior": 1, "alpha": 0.5},
+            {"alpha": 1e-3},
+            {"distribution": "beckmann", "alpha": 1e-3, "ior": 0.1},
+        ],
+        albedo_cases=[
+            {},
+            {"alpha": 0.5, "ior": 1.33, "refracted": (0.9, 0.5, 0), "reflected": (0.2, 0.5, 1)},
+            {"alpha": 1, "masking": "smith_separable"},
+            {"distribution": "beckmann", "alpha": 0.5},
+            {"distribution": "beckmann", "masking": "smith_separable", "alpha": 1, "ior": 0.75},
+        ],
+        cosines=[1, 0.5, 0.1, -0.9, -0.5],
+    ),
     "ward": dict(
         f=ward_f,
         pdf=ward_pdf,
@@ -2046,6 +2215,8 @@ def main():
                         wi, wo = wo, wi
                 elif p.get("around") == "retro":
                     wo = (-wo[0], -wo[1], wo[2])
+                elif "pair" in m:
+                    wi, wo = m["pair"](p, wi, wo, rng)
                 for kind in ("f", "pdf"):
                     v = values(m[kind], p, wi, wo)
                     # Values below the normal range of double precision can't be compared.

@@ -155,6 +155,21 @@ TEST_P(ModelCase, AlbedoConservesAndAgreesWithSampling) {
   }
 }
 
+TEST_P(ModelCase, LostSamplesPointWhereNothingIsScattered) {
+  // The aimed form divides f by the pdf in the direction of a sample, also of a lost one.
+  if (!model().has_scatter()) return;
+  const measure::BoundModel b = bound();
+  measure::Random random(5);
+  for (int i = 0; i < 4000; ++i) {
+    Vec3<double> wo = measure::uniform_direction(random);
+    if (measure::two_sided(model(), *b.brdf) && i % 2 == 1) wo.z = -wo.z;
+    const Vec3<double> u{measure::uniform(random), measure::uniform(random), measure::uniform(random)};
+    const Sample<double> s = b.brdf->sample(wo, u);
+    if (s.pdf > 0) continue;
+    ASSERT_EQ(max_component(b.brdf->eval(s.wi, wo)), 0) << b.label << " wo.z=" << wo.z;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Cases, ModelCase, testing::ValuesIn(cases("cases")), test_name);
 
 TEST(Sampling, FollowsThePdfAtTheExtremesToo) {
