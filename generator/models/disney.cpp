@@ -45,7 +45,7 @@ template <class T> struct Disney {
       clearcoat_gloss;
   Choice masking;
 
-  enum { Remapped, Facets };
+  enum { Remapped, OfFacets };
 
   static ModelInfo info() {
     return {.name = "disney",
@@ -99,14 +99,18 @@ template <class T> struct Disney {
     return named("C", mix(mix(Rgb<T>(T(1)), hue(), specular_tint) * (T(0.08) * specular), color, metallic));
   }
 
+  /// F_ss, from the product of two factors (1 - k s).
+  static T flat(const T& pair, const T& sum) {
+    return T(1.25) * (pair * (T(1) / maximum(sum, tiny<T>()) - T(0.5)) + T(0.5));
+  }
+
   /// What is below the highlights.
   Rgb<T> matte(const T& F, const Vec3<T>& wi, const Vec3<T>& wo) const {
     const T k = T(1) - roughness * ((T(1) + dot(wi, wo)) / T(2));
     const T pair = (T(1) - k * schlick_weight(wi.z)) * (T(1) - k * schlick_weight(wo.z));
-    const T flat = T(1.25) * (pair * (T(1) / maximum(wi.z + wo.z, tiny<T>()) - T(0.5)) + T(0.5));
     const T d = burley_diffuse(roughness, wi, wo);
     const Rgb<T> rim = mix(Rgb<T>(T(1)), hue(), sheen_tint) * (F * sheen);
-    return (color * ((d + (flat - d) * subsurface) / pi<T>()) + rim) * (T(1) - metallic);
+    return (color * ((d + (flat(pair, wi.z + wo.z) - d) * subsurface) / pi<T>()) + rim) * (T(1) - metallic);
   }
 
   /// 1 / ((n.w) + S) with masking of the roughness a.
@@ -117,8 +121,7 @@ template <class T> struct Disney {
   T remapped() const { return named("a", sqr(T(0.5) + roughness / T(2))); }
   /// G / (4 (n.i) (n.o)) of the highlight.
   T shape(const Facets<T>& g, const Vec3<T>& wi, const Vec3<T>& wo) const {
-    if (masking == Facets)
-      return T(0.25) / maximum((maximum(wi.z, T(0)) + g.hidden(wi)) * (maximum(wo.z, T(0)) + g.hidden(wo)), tiny<T>());
+    if (masking == OfFacets) return g.smith_shape(false, wi, wo);
     return masked(wi.z, remapped()) * masked(wo.z, remapped());
   }
 
@@ -152,7 +155,7 @@ template <class T> struct Disney {
     const Facets<T> g = highlight();
     const auto [high, coat] = shares(wo);
     const T p = (T(1) - high - coat) * cosine_pdf(wi) +
-                high * g.D(k.h) / (T(4) * (maximum(wo.z, T(0)) + g.hidden(wo))) +
+                high * g.D(k.h) * g.visible(k.h.z, k.oh, wo) +
                 coat * D_coat(k.h) * k.h.z / (T(4) * maximum(k.oh, tiny<T>()));
     return select(above(wi, wo), p, T(0));
   }
@@ -170,33 +173,48 @@ template <class T> struct Disney {
     return sample_if(above(wi, wo), wi, eval(wi, wo) * (wi.z / maximum(p, tiny<T>())), p);
   }
 
-  /// The matte term, but for sheen and most of what subsurface scattering varies; and the highlight with the Fresnel
-  /// term of the middle of its lobe.
+  /// All but sheen and coat: the flat term with the mean of (o.h)^2 over the azimuth, and the highlight with the Fresnel
+  /// term of the middle of its lobe. A closure can't stretch facets to a roughness above 1.
   ClosureSum<T> base(const Vec3<T>& wo) const {
     const Facets<T> g = highlight();
     const T z = maximum(wo.z, tiny<T>()), hidden = g.hidden(wo);
     const Rgb<T> below = color * (T(1) - metallic);
     Closure<T> burley(ClosureKind::Burley, below * (T(1) - subsurface));
     burley.roughness = roughness;
-    const T far = (T(1) / (z + T(0.6)) - T(0.5)) * (T(1) - (T(1) - T(0.5) * roughness) * schlick_weight(wo.z));
-    const Closure<T> flat(ClosureKind::Diffuse, below * (subsurface * (T(1.25) * far + T(0.625))));
+    const auto flat_towards = [&](const T& c) {
+      const T k = T(1) - roughness * ((T(1) + c * z) / T(2));
+      return flat((T(1) - k * schlick_weight(c)) * (T(1) - k * schlick_weight(z)), c + z);
+    };
+    const T albedo = flat_towards(T(0.6));
+    Closure<T> ramp(ClosureKind::DiffuseRamp, below * (subsurface * albedo));
+    ramp.ramp[0] = Rgb<T>(T(0));
+    for (int i = 1; i < kRampSize; ++i) {
+      const T c(i / double(kRampSize - 1));
+      ramp.ramp[std::size_t(i)] = Rgb<T>(c * flat_towards(c) / albedo);
+    }
     const T height = lobe_height(wo.z, T(0.7) * (sqr(g.ax * wo.x) + sqr(g.ay * wo.y)));
     // Cycles' masking at the mirrored view is 1 / (1 + 2 Lambda).
-    const T of_cycles = (z + T(2) * hidden) / z;
-    const T ours = masking == Facets ? sqr(z / (z + hidden)) : sqr(T(2) * z * masked(z, remapped()));
+    const T of_cycles = (z + T(2) * hidden) / (z * maximum(g.ax, T(1)));
+    const T ours = masking == OfFacets ? sqr(z / (z + hidden)) : sqr(T(2) * z * masked(z, remapped()));
     const Rgb<T> F = mix(C(), Rgb<T>(T(1)), schlick_weight(clamp01(height)));
-    return {burley, flat, facets(ClosureKind::Ggx, F * (ours * of_cycles), g.ax, g.ay, T(0))};
+    return {burley, ramp, facets(ClosureKind::Ggx, F * (ours * of_cycles), g.ax, g.ay, T(0))};
   }
 
-  /// Lambert's law, and the facets with their own masking. Separable masking is at least the correlated one over
-  /// 1 + Lambda_o.
+  /// Lambert's law, and the same facets with the masking of Cycles, 1 / (1 + L_i + L_o) with Smith's Lambda L of ggx.
+  /// Separable masking of the same facets is at least that over 1 + L_o. With the roughness a instead, which is larger,
+  /// 1 + L_i is at most a / min(ax, ay) times as large as that of the facets. A closure can't stretch facets to a
+  /// roughness above 1.
   ClosureSum<T> under(const Vec3<T>& wo) const {
     const Facets<T> g = highlight();
     const T z = maximum(wo.z, tiny<T>());
-    const T least = (T(1) - subsurface) * least_burley_diffuse(roughness, wo) + subsurface * T(0.625);
-    const Rgb<T> glossy = masking == Facets ? C() * (z / (z + g.hidden(wo))) : Rgb<T>(T(0));
-    return {Closure<T>(ClosureKind::Diffuse, color * ((T(1) - metallic) * least)),
-            facets(ClosureKind::Ggx, glossy, g.ax, g.ay, T(0))};
+    const T matte = (T(1) - subsurface) * least_burley_diffuse(roughness, wo) + subsurface * T(0.625);
+    const T seen = masking == OfFacets
+                       ? z / (z + g.hidden(wo))
+                       : minimum(minimum(g.ax, g.ay) / remapped(), T(1)) * (T(2) * z * masked(z, remapped()));
+    Closure<T> glossy = facets(ClosureKind::Ggx, Rgb<T>(select(g.ax <= T(1), seen, T(0))), g.ax, g.ay, T(0));
+    glossy.metal = true;
+    glossy.f0 = C();
+    return {Closure<T>(ClosureKind::Diffuse, color * ((T(1) - metallic) * matte)), glossy};
   }
 };
 
