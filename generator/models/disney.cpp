@@ -16,16 +16,16 @@
 //   D_coat = (b^2 - 1) / (2 pi log(b) (1 + (b^2 - 1) (n.h)^2)), b = mix(0.1, 0.001, clearcoat_gloss),
 //   G_a = 1 / (((n.i) + S_i) ((n.o) + S_o)), S = sqrt(a^2 + (n.w)^2 - a^2 (n.w)^2): Smith's separable masking over
 //     4 (n.i) (n.o).
-// Of the masking of the highlight there are two versions. In the course a = (1/2 + roughness / 2)^2, which looks less
-// harsh than the facets' own masking (choice remapped). Code from 2014 on, and Blender's, take the facets' own, S =
-// sqrt((ax w.x)^2 + (ay w.y)^2 + (n.w)^2) (choice facets). The published code takes colours to the power of 2.2, as
-// they are display-referred there; here they are linear. Blender's hue has other weights, 0.2126, 0.7152 and 0.0722,
-// and its Specular of 0.5 is the same as here.
+// Of the masking of the highlight there are two versions. In the course a = (1/2 + roughness / 2)^2, so that smooth
+// surfaces gain less towards the rim than with the facets' own masking (choice remapped). Code from 2014 on, and
+// Blender's, take the facets' own, S = sqrt((ax w.x)^2 + (ay w.y)^2 + (n.w)^2) (choice facets). The published code
+// takes colours to the power of 2.2, as they are display-referred there; here they are linear. Blender's hue has other
+// weights, 0.2126, 0.7152 and 0.0722, and its Specular of 0.5 is the same as here.
 //
 // Energy. The layers are added up, and nothing takes off below what is reflected above; the matte term gains light by
 // itself. With a base color of 1 the albedo is 1.04 from above by default and up to 1.09 near the horizon; with sheen,
-// clearcoat and roughness at 1 it is 1.06 from above and 1.67 near the horizon. Rough metals lose light instead: with
-// roughness 1 the albedo is 0.31 from above and 0.60 near the horizon. f is reciprocal.
+// clearcoat and roughness at 1 it is 1.06 from above and 1.69 near the horizon. Rough metals lose light instead: with
+// roughness 1 the albedo is 0.31 from above and 0.61 near the horizon. f is reciprocal.
 //
 // Numerical stability. k s of F_ss has no half vector: (o.h)^2 = (1 + wi.wo) / 2. D_coat is (1 - b^2) / (-2 pi log(b)
 // (sin^2 theta_h + b^2 (n.h)^2)), from the half vector's components.
@@ -58,7 +58,8 @@ template <class T> struct Disney {
                            .isotropic = false,
                            .exact_sampling = false,
                            .specular_limit = "metallic=1 roughness=0",
-                           .albedo_table = false},
+                           .albedo_table = false,
+                           .fit_axis = "roughness"},
             .params = {}};
   }
 
@@ -154,8 +155,7 @@ template <class T> struct Disney {
     const HalfVector<T> k(wi, wo);
     const Facets<T> g = highlight();
     const auto [high, coat] = shares(wo);
-    const T p = (T(1) - high - coat) * cosine_pdf(wi) +
-                high * g.D(k.h) * g.visible(k.h.z, k.oh, wo) +
+    const T p = (T(1) - high - coat) * cosine_pdf(wi) + high * g.D(k.h) * g.visible(k.h.z, k.oh, wo) +
                 coat * D_coat(k.h) * k.h.z / (T(4) * maximum(k.oh, tiny<T>()));
     return select(above(wi, wo), p, T(0));
   }
@@ -173,8 +173,8 @@ template <class T> struct Disney {
     return sample_if(above(wi, wo), wi, eval(wi, wo) * (wi.z / maximum(p, tiny<T>())), p);
   }
 
-  /// All but sheen and coat: the flat term with the mean of (o.h)^2 over the azimuth, and the highlight with the Fresnel
-  /// term of the middle of its lobe. A closure can't stretch facets to a roughness above 1.
+  /// All but sheen and coat: the flat term with the mean of (o.h)^2 over the azimuth, and the highlight with the
+  /// Fresnel term of the middle of its lobe. A closure can't stretch facets to a roughness above 1.
   ClosureSum<T> base(const Vec3<T>& wo) const {
     const Facets<T> g = highlight();
     const T z = maximum(wo.z, tiny<T>()), hidden = g.hidden(wo);

@@ -28,8 +28,7 @@ std::vector<ParamValues> cases_of(const ModelInfo& info) {
 /// Facets with another masking, or closures of another shape: their light beyond the model's is judged as a whole.
 bool exceeds_a_little(const std::string& name) {
   static const std::set<std::string> names = {
-      "blinn",      "cook_torrance",  "disney", "disney_diffuse", "glossy_reflector",
-      "microfacet", "phong_material", "ward"};
+      "blinn", "cook_torrance", "disney", "disney_diffuse", "glossy_reflector", "microfacet", "phong_material", "ward"};
   return names.count(name) == 1;
 }
 

@@ -1408,9 +1408,7 @@ def disney_pdf(p, wi, wo):
     visible = ds / (2 * (k2[2] + mp.sqrt((k2[0] * ax) ** 2 + (k2[1] * ay) ** 2 + k2[2] ** 2)))
     a2 = (mp.mpf("0.1") + s["clearcoat_gloss"] * (mp.mpf("0.001") - mp.mpf("0.1"))) ** 2
     dr = (a2 - 1) / (mp.pi * mp.log(a2) * (1 + (a2 - 1) * h[2] ** 2))
-    return (
-        below * k1[2] / mp.pi + high * visible + coat * dr * h[2] / (4 * dot(h, k1))
-    ) / total
+    return (below * k1[2] / mp.pi + high * visible + coat * dr * h[2] / (4 * dot(h, k1))) / total
 
 
 def disney_albedo(p, cos_o):
