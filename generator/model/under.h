@@ -85,7 +85,7 @@ template <class T> T narrow_towards_horizon(const T& a, const Vec3<T>& wo) {
 /// 1)). Masking takes light towards the horizon. Where the power is small, the facets exceed it by less than 2e-4 of
 /// its light.
 template <class T> Closure<T> power_facets_under(const Rgb<T>& weight, const T& e, const Vec3<T>& wo) {
-  const T more = T(1) + T(2.5) / (e + T(1)), c2 = sqr(wo.z);  // 1 does for large e
+  const T more = T(1) + T(2.8) / (e + T(1)), c2 = sqr(wo.z);  // 1 does for large e
   const T x = T(1) / (e + more), y = T(1) / (e * c2 + more);
   Closure<T> c(ClosureKind::Beckmann, weight * (wo.z * (e + T(1)) * sqrt(x * y)));
   c.alpha = facet_alpha(sqrt(x / T(2)));

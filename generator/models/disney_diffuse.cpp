@@ -18,7 +18,7 @@
 // Under the model is Lambert's law. The largest k is that of a light opposite to the viewer at the horizon, K = 1/2 - r
 // (1 - sin theta_o), so f >= rho / pi (1 - K) (1 - K s_o). Only close to the horizon is f as small as that. With
 // K^(2/3) / 8 more in place of the first factor, what is too bright is at most 5e-5 of the light.
-#include "model/sampling.h"
+#include "model/burley.h"
 #include "model/under.h"
 
 namespace brdfc {
@@ -44,8 +44,7 @@ template <class T> struct DisneyDiffuse {
   }
 
   Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
-    const T k = named("k", T(0.5) - r * (T(1) + dot(wi, wo)));
-    const T pair = (T(1) - k * schlick_weight(wi.z)) * (T(1) - k * schlick_weight(wo.z));
+    const T pair = burley_diffuse(r, wi, wo);
     return select(above(wi, wo), rho * (pair / pi<T>()), Rgb<T>(T(0)));
   }
 
@@ -63,10 +62,7 @@ template <class T> struct DisneyDiffuse {
   }
 
   ClosureSum<T> under(const Vec3<T>& wo) const {
-    const T zo = clamp01(wo.z),
-            most = named("most", maximum(T(0.5) - r * sqr(zo) / (T(1) + sqrt(sin2_theta(wo))), T(0)));
-    const T more = minimum(sqr(cbrt(most)) / T(8), most);
-    return {Closure<T>(ClosureKind::Diffuse, rho * ((T(1) - most + more) * (T(1) - most * schlick_weight(zo))))};
+    return {Closure<T>(ClosureKind::Diffuse, rho * least_burley_diffuse(r, wo))};
   }
 };
 

@@ -135,6 +135,11 @@ const BaseRow kBaseRows[] = {{"ashikhmin_shirley", {}, 0.008, 0.18},
                              {"cook_torrance", {}, 0.007, 0.16},
                              {"coupled", {}, 0.006, 0.006},
                              {"coupled", {"fresnel=dielectric"}, 0.006, 0.006},
+                             {"disney", {}, 0.0023, 0.043},
+                             {"disney", {"masking=facets", "roughness=0.3"}, 2e-5, 0.092},
+                             {"disney", {"metallic=1", "anisotropic=0.8"}, 0.028, 0.19},
+                             {"disney", {"subsurface=1"}, 0.0035, 0.052},
+                             {"disney", {"sheen=1", "clearcoat=1"}, 0.0135, 0.106},
                              {"factors", {}, 0.048, 0.48},
                              {"factors", {"ax=0.05", "ay=0.4"}, 0.061, 0.35},
                              {"glossy_reflector", {}, 0.023, 0.026},
@@ -185,9 +190,9 @@ TEST(Base, CarriesWhatWasMeasured) {
 /// In double and float, for all parameters and views; within the sliders' ranges the base never exceeds the model by
 /// much.
 TEST(Base, HasWeightsThatClosuresMayHave) {
-  measure::Random random(8);
   for (const auto& [name, m] : models()) {
     if (!m->has_base()) continue;
+    measure::Random random(8);  // the same values whatever other models there are
     std::vector<ParamValues> cases = measure::slider_cases(m->info(), 20, 3);
     const std::size_t random_ones = cases.size();
     for (const bool sliders : {true, false})

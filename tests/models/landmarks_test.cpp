@@ -207,6 +207,28 @@ class Chandrasekhar {
   std::array<double, kNodes> y_, h_;
 };
 
+TEST(Disney, HasPartsThatAreOtherModels) {
+  const char* color = "base_color=0.9,0.5,0.1";
+  const double aspect = std::sqrt(1 - 0.9 * 0.8);
+  const auto number = [](const char* name, double value) { return name + std::to_string(value); };
+  const measure::BoundModel metal = bound("disney", {color, "metallic=1", "anisotropic=0.8", "masking=facets"}),
+                            facets = bound("microfacet", {"f0=0.9,0.5,0.1", "masking=smith_separable",
+                                                          number("ax=", 0.25 / aspect), number("ay=", 0.25 * aspect)}),
+                            black = bound("disney", {"base_color=0", "roughness=0.8"}),
+                            colored = bound("disney", {color, "roughness=0.8"}),
+                            matte = bound("disney_diffuse", {"rho=0.9,0.5,0.1", "r=0.8"});
+  Sequence2 sequence(1);
+  for (int i = 0; i < 2000; ++i) {
+    const auto [a, b] = sequence.next();
+    const Vec3<double> wi = direction(1 - a, 7 * b), wo = direction(1 - b, 5 * a);
+    const Rgb<double> f = metal.brdf->eval(wi, wo), g = facets.brdf->eval(wi, wo);
+    EXPECT_NEAR(f.r, g.r, 1e-5 * (1 + g.r));
+    EXPECT_NEAR(f.b, g.b, 1e-5 * (1 + g.b));
+    const double below = colored.brdf->eval(wi, wo).g - black.brdf->eval(wi, wo).g;
+    EXPECT_NEAR(below, matte.brdf->eval(wi, wo).g, 1e-12 * (1 + black.brdf->eval(wi, wo).g));
+  }
+}
+
 TEST(Hapke, WithoutSurgeAndMultipleScatteringIsLommelAndSeeligersLaw) {
   const measure::BoundModel b = bound("hapke", {"w=0.6", "b=0", "b0=0", "scattering=single"});
   for (const double c : {1., 0.5, 0.1, 0.01}) {

@@ -1317,6 +1317,118 @@ def charlie_albedo(p, cos_o):
     return [c * total for c in p["tint"]]
 
 
+# ---- Disney: Burley, 2012, with the constants of BRDF Explorer's disney.brdf ---------------------
+
+
+DISNEY_NUMBERS = (
+    *("metallic", "roughness", "subsurface", "specular", "specular_tint", "anisotropic", "sheen"),
+    *("sheen_tint", "clearcoat", "clearcoat_gloss"),
+)
+
+
+class NumPy:
+    """NumPy with the names that mpmath has."""
+
+    pi, sqrt, log, mpf = math.pi, staticmethod(np.sqrt), staticmethod(np.log), float
+
+
+def disney_terms(p, color, zi, zo, ii, oo, h, oh, lib):
+    """f of one channel. `ii` and `oo`: (x, y) of both directions; `h`: the half vector."""
+    s, v = {k: lib.mpf(p[k]) for k in DISNEY_NUMBERS}, lib.mpf
+    lum = v("0.3") * v(p["base_color"][0]) + v("0.6") * v(p["base_color"][1])
+    lum += v("0.1") * v(p["base_color"][2])
+
+    def mix(a, b, t):
+        return a * (1 - t) + b * t
+
+    def schlick(c):
+        return (1 - c) ** 5
+
+    def smith(c, a):
+        return 1 / (c + lib.sqrt(a * a + c * c - a * a * c * c))
+
+    tint = color / lum if lum > 0 else v(1)
+    spec0 = mix(
+        s["specular"] * v("0.08") * mix(v(1), tint, s["specular_tint"]), color, s["metallic"]
+    )
+    fl, fv, fh = schlick(zi), schlick(zo), schlick(oh)
+    fd90 = v("0.5") + 2 * oh * oh * s["roughness"]
+    fd = mix(v(1), fd90, fl) * mix(v(1), fd90, fv)
+    fss90 = oh * oh * s["roughness"]
+    fss = mix(v(1), fss90, fl) * mix(v(1), fss90, fv)
+    ss = v("1.25") * (fss * (1 / (zi + zo) - v("0.5")) + v("0.5"))
+    aspect = lib.sqrt(1 - s["anisotropic"] * v("0.9"))
+    ax, ay = (max(v("0.001"), s["roughness"] ** 2 * k) for k in (1 / aspect, aspect))
+    ds = 1 / (lib.pi * ax * ay * ((h[0] / ax) ** 2 + (h[1] / ay) ** 2 + h[2] ** 2) ** 2)
+    if p["masking"] == "remapped":
+        a = (s["roughness"] * v("0.5") + v("0.5")) ** 2
+        gs = smith(zi, a) * smith(zo, a)
+    else:
+        gs = 1
+        for c, (x, y) in ((zi, ii), (zo, oo)):
+            gs /= c + lib.sqrt((x * ax) ** 2 + (y * ay) ** 2 + c * c)
+    a2 = mix(v("0.1"), v("0.001"), s["clearcoat_gloss"]) ** 2
+    dr = (a2 - 1) / (lib.pi * lib.log(a2) * (1 + (a2 - 1) * h[2] ** 2))
+    fr = mix(v("0.04"), v(1), fh)
+    gr = smith(zi, v("0.25")) * smith(zo, v("0.25"))
+    rim = fh * s["sheen"] * mix(v(1), tint, s["sheen_tint"])
+    matte = (mix(fd, ss, s["subsurface"]) * color / lib.pi + rim) * (1 - s["metallic"])
+    return matte + gs * mix(spec0, v(1), fh) * ds + v("0.25") * s["clearcoat"] * gr * fr * dr
+
+
+def disney_f(p, wi, wo):
+    k1, k2, h = as_half(wi, wo)
+    return [
+        disney_terms(p, mp.mpf(c), k1[2], k2[2], k1[:2], k2[:2], h, dot(h, k1), mp)
+        for c in p["base_color"]
+    ]
+
+
+def disney_pdf(p, wi, wo):
+    k1, k2, h = as_half(wi, wo)
+    s = {k: mp.mpf(p[k]) for k in DISNEY_NUMBERS}
+    lum = sum(mp.mpf(a) * c for a, c in zip(("0.3", "0.6", "0.1"), p["base_color"], strict=True))
+    spec0 = max(
+        (1 - s["metallic"])
+        * s["specular"]
+        * mp.mpf("0.08")
+        * (1 + s["specular_tint"] * (c / lum - 1))
+        + s["metallic"] * c
+        for c in map(mp.mpf, p["base_color"])
+    )
+    fresnel = (1 - k2[2]) ** 5
+    below = (max(p["base_color"]) + s["sheen"] / 10) * (1 - s["metallic"]) + mp.mpf("0.02")
+    high = (spec0 + (1 - spec0) * fresnel) * (1 - s["roughness"] / 2)
+    coat = s["clearcoat"] * (mp.mpf("0.02") + mp.mpf("0.2") * fresnel)
+    total = below + high + coat
+    aspect = mp.sqrt(1 - s["anisotropic"] * mp.mpf("0.9"))
+    ax, ay = (max(mp.mpf("0.001"), s["roughness"] ** 2 * k) for k in (1 / aspect, aspect))
+    ds = 1 / (mp.pi * ax * ay * ((h[0] / ax) ** 2 + (h[1] / ay) ** 2 + h[2] ** 2) ** 2)
+    # D G1 / (4 (n.o)), with G1 = 2 (n.o) / ((n.o) + sqrt(...)).
+    visible = ds / (2 * (k2[2] + mp.sqrt((k2[0] * ax) ** 2 + (k2[1] * ay) ** 2 + k2[2] ** 2)))
+    a2 = (mp.mpf("0.1") + s["clearcoat_gloss"] * (mp.mpf("0.001") - mp.mpf("0.1"))) ** 2
+    dr = (a2 - 1) / (mp.pi * mp.log(a2) * (1 + (a2 - 1) * h[2] ** 2))
+    return (below * k1[2] / mp.pi + high * visible + coat * dr * h[2] / (4 * dot(h, k1))) / total
+
+
+def disney_albedo(p, cos_o):
+    """Without anisotropy; for lobes that these nodes resolve."""
+    nodes, weights = ends(120)
+    so, total = math.sqrt(1 - cos_o**2), [0.0] * 3
+    for low, high in itertools.pairwise(sorted({0, cos_o, 1})):
+        x = (low + (high - low) * nodes)[:, None]
+        si = np.sqrt(1 - x * x)
+        phi = math.pi * nodes
+        cosine = si * so * np.cos(phi) + x * cos_o
+        length = np.sqrt(2 + 2 * cosine)
+        h = ((si * np.cos(phi) + so) / length, si * np.sin(phi) / length, (x + cos_o) / length)
+        ii = (si * np.cos(phi), si * np.sin(phi))
+        for i, color in enumerate(p["base_color"]):
+            f = disney_terms(p, color, x, cos_o, ii, (so, 0.0), h, length / 2, NumPy)
+            total[i] += (high - low) * 2 * math.pi * float(weights @ (x * f) @ weights)
+    return total
+
+
 # ---- Hapke: 1981, with H of 2002 and the two lobes of the book's second edition -----------------
 
 
@@ -1954,6 +2066,40 @@ MODELS = {
             {"r": 1, "rho": (1, 0.5, 0.1)},
             {"r": 1e-4},
             {"r": 0, "rho": (0.9, 0.2, 1e-6)},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
+    "disney": dict(
+        f=disney_f,
+        pdf=disney_pdf,
+        albedo=disney_albedo,
+        defaults={
+            "base_color": (0.8, 0.8, 0.8),
+            "metallic": 0,
+            "roughness": 0.5,
+            "subsurface": 0,
+            "specular": 0.5,
+            "specular_tint": 0,
+            "anisotropic": 0,
+            "sheen": 0,
+            "sheen_tint": 0.5,
+            "clearcoat": 0,
+            "clearcoat_gloss": 1,
+            "masking": "remapped",
+        },
+        cases=[
+            {},
+            {"metallic": 1, "roughness": 0.2, "anisotropic": 0.8, "base_color": (0.9, 0.5, 0.1)},
+            {
+                **{"base_color": (0.5, 0.1, 0.02), "subsurface": 0.7, "specular_tint": 0.6},
+                **{"sheen": 0.8, "sheen_tint": 0.3, "clearcoat": 0.5, "clearcoat_gloss": 0.2},
+            },
+            {"masking": "facets", "roughness": 0.8, "anisotropic": 0.5, "specular": 1},
+        ],
+        albedo_cases=[
+            {},
+            {"metallic": 0.5, "roughness": 0.8, "base_color": (0.9, 0.5, 0.1)},
+            {"subsurface": 0.7, "sheen": 1, "roughness": 0.9, "masking": "facets"},
         ],
         cosines=[1, 0.5, 0.1],
     ),
