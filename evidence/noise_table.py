@@ -480,6 +480,13 @@ def run(jobs, work, table, options, cache, processes):
     return failed
 
 
+def bench_costs():
+    """Costs that evidence/bench measured, by model and form."""
+    path = Path(__file__).resolve().parents[1] / "blender_addon" / "costs.csv"
+    with open(path, encoding="utf-8", newline="") as file:
+        return {(row["model"], row["form"]): float(row["cost"]) for row in csv.DictReader(file)}
+
+
 def is_missing(job, table):
     model, values = job["case"]
     for form in job["wanted"]:
@@ -585,7 +592,7 @@ def main():
         kept = Table(docs / made.path.name, made.fields, made.key)
         kept.add(made.rows.values())
         made.all = list(kept.rows.values())
-    page = Page(measured.all, costs.all, conditions).text(options.seeds)
+    page = Page(measured.all, costs.all, conditions, bench_costs()).text(options.seeds)
     (docs / "noise.md").write_text(page + "\n", encoding="utf-8")
     print(docs / "noise.md")
     if failed:

@@ -72,3 +72,12 @@ def test_rows_survive_and_are_replaced_by_key(tmp_path):
         "3",
         "2",
     ]
+
+
+def test_the_best_form_has_the_least_noise_times_cost():
+    rows = [row("a", "exact", 0.002), row("a", "aimed", 0.001), row("b", "exact", 0.002)]
+    costs = {("a", "exact"): 1.0, ("a", "aimed"): 3.0, ("b", "exact"): 1.0}
+    made = noise_page.Page([UNIT, *rows], [], CONDITIONS, costs)
+    best = dict(made.best_forms(("lamp", 64)))
+    assert best == {"exact": 1}, "of b only one form is known, and 3 x 0.001 is more than 0.002"
+    assert "| exact | 1 |" in made.text(seeds=4)
