@@ -27,8 +27,9 @@
 // clearcoat and roughness at 1 it is 1.06 from above and 1.69 near the horizon. Rough metals lose light instead: with
 // roughness 1 the albedo is 0.31 from above and 0.61 near the horizon. f is reciprocal.
 //
-// Numerical stability. k s of F_ss has no half vector: (o.h)^2 = (1 + wi.wo) / 2. D_coat is (1 - b^2) / (-2 pi log(b)
-// (sin^2 theta_h + b^2 (n.h)^2)), from the half vector's components.
+// Numerical stability. F_ss needs no half vector: (o.h)^2 = (1 + wi.wo) / 2. Near the horizon 1 - k s loses digits; (1
+// - s) + (1 - k) s does not, where 1 - s is a polynomial in the cosine. D_coat is (1 - b^2) / (-2 pi log(b) (sin^2
+// theta_h + b^2 (n.h)^2)), from the half vector's components.
 //
 // Sampling chooses among Lambert's cosine, visible normals of ggx and normals of the coat, with shares after their
 // albedos.
@@ -100,18 +101,18 @@ template <class T> struct Disney {
     return named("C", mix(mix(Rgb<T>(T(1)), hue(), specular_tint) * (T(0.08) * specular), color, metallic));
   }
 
-  /// F_ss, from the product of two factors (1 - k s).
-  static T flat(const T& pair, const T& sum) {
-    return T(1.25) * (pair * (T(1) / maximum(sum, tiny<T>()) - T(0.5)) + T(0.5));
+  /// F_ss, for the cosines of both directions and wi.wo.
+  T flat(const T& ci, const T& co, const T& across) const {
+    const T facing = roughness * ((T(1) + across) / T(2));  // 1 - k
+    const auto factor = [&](const T& c) { return one_minus_schlick_weight(c) + facing * schlick_weight(c); };
+    return T(1.25) * (factor(ci) * factor(co) * (T(1) / maximum(ci + co, tiny<T>()) - T(0.5)) + T(0.5));
   }
 
   /// What is below the highlights.
   Rgb<T> matte(const T& F, const Vec3<T>& wi, const Vec3<T>& wo) const {
-    const T k = T(1) - roughness * ((T(1) + dot(wi, wo)) / T(2));
-    const T pair = (T(1) - k * schlick_weight(wi.z)) * (T(1) - k * schlick_weight(wo.z));
     const T d = burley_diffuse(roughness, wi, wo);
     const Rgb<T> rim = mix(Rgb<T>(T(1)), hue(), sheen_tint) * (F * sheen);
-    return (color * ((d + (flat(pair, wi.z + wo.z) - d) * subsurface) / pi<T>()) + rim) * (T(1) - metallic);
+    return (color * ((d + (flat(wi.z, wo.z, dot(wi, wo)) - d) * subsurface) / pi<T>()) + rim) * (T(1) - metallic);
   }
 
   /// 1 / ((n.w) + S) with masking of the roughness a.
@@ -181,10 +182,7 @@ template <class T> struct Disney {
     const Rgb<T> below = color * (T(1) - metallic);
     Closure<T> burley(ClosureKind::Burley, below * (T(1) - subsurface));
     burley.roughness = roughness;
-    const auto flat_towards = [&](const T& c) {
-      const T k = T(1) - roughness * ((T(1) + c * z) / T(2));
-      return flat((T(1) - k * schlick_weight(c)) * (T(1) - k * schlick_weight(z)), c + z);
-    };
+    const auto flat_towards = [&](const T& c) { return flat(c, z, c * z); };
     const T albedo = flat_towards(T(0.6));
     Closure<T> ramp(ClosureKind::DiffuseRamp, below * (subsurface * albedo));
     ramp.ramp[0] = Rgb<T>(T(0));
