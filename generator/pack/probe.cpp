@@ -112,9 +112,10 @@ std::string probe_source(const Model& model, const ParamValues& choices) {
                    print::Loop{"i", 3, {print::If{!call("isfinite", {channel}), {assign(channel, -31337.0)}}}},
                    assign("BSDF", Value("first") * call("emission")),
                });
+  // In a block of their own, parameters may be called as closures are that Blender's headers declare, such as sheen.
   return "// SPDX-License-Identifier: GPL-3.0-or-later\n" + print::library_for(print::functions_in(body)) +
-         "\nshader brdfc_probe(\n" + parameters + "    output closure color BSDF = 0)\n{\n" +
-         print::osl_statements(body, 1).text + "}\n";
+         "\nshader brdfc_probe(\n" + parameters + "    output closure color BSDF = 0)\n{\n    {\n" +
+         print::osl_statements(body, 2).text + "    }\n}\n";
 }
 
 std::vector<std::array<ProbeValues, 4>> run_probe(const Model& model, const ParamValues& choices,
