@@ -169,12 +169,14 @@ def fill_with_nodes(group, form, source, twin_group, room=lamps.WHOLE):
 
 
 def _stand_in(group, form, twin_group, sources):
-    """Outputs by name of what stands in for a form, if anything does: of the twin those that no
-    node of Blender's has."""
+    """Outputs by name of what stands in for a form, if anything does: those of the twin, or of
+    nodes in its place."""
     made = _instance(group, twin_group, sources) if twin_group is not None else {}
-    if stand_in.has_node(form.model) and "baked" not in group[TAG]:
-        made |= stand_in.node_of(group, form, sources)
-    return made
+    if "baked" in group[TAG]:
+        return made
+    if stand_in.has_node(form.model):
+        return made | stand_in.node_of(group, form, sources)
+    return made | (stand_in.albedo_of(group, form, sources) if made else {})
 
 
 def _relays(group, interface, parameters, without=()):

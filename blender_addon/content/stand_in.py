@@ -12,7 +12,7 @@ import math
 import bpy
 
 from ..packs import pack
-from . import width_albedo
+from . import table_albedo
 from .wiring import Wiring
 
 #: Name of that script node, and of its output.
@@ -151,6 +151,10 @@ class _Given:
             return self._sources[name]
         return self._form.constants[name]
 
+    def constant(self, name, default):
+        """The value of a parameter if it is constant, by default this one; otherwise None."""
+        return None if name in self._sources else self._form.constants.get(name, default)
+
     def is_not(self, name, choice):
         """1 unless a choice is this one, otherwise 0."""
         if name not in self._sources:
@@ -172,11 +176,19 @@ def node_of(group, form, sources):
     w, model = Wiring(group), form.model
     given, normal = _Given(w, form, sources), w.bent_or_own(sources[pack.NORMAL])
     made = {"BSDF": _NODES[model.name](w, given, normal)}
-    if model.name in width_albedo.WIDTHS and model.has_albedo:
-        viewer = w.node("ShaderNodeNewGeometry").outputs["Incoming"]
-        cos_theta = w.vector("DOT_PRODUCT", normal, viewer, output="Value")
-        made["Albedo"] = width_albedo.wire(w, model, given, cos_theta)
-    return made
+    return made | albedo_of(group, form, sources, normal)
+
+
+def albedo_of(group, form, sources, normal=None):
+    """The output of nodes with the albedo, by name, if the model's twin has another; as
+    node_of()."""
+    w, model = Wiring(group), form.model
+    if not table_albedo.is_needed(model):
+        return {}
+    normal = normal or w.bent_or_own(sources[pack.NORMAL])
+    viewer = w.node("ShaderNodeNewGeometry").outputs["Incoming"]
+    cos_theta = w.vector("DOT_PRODUCT", normal, viewer, output="Value")
+    return {"Albedo": table_albedo.wire(w, model, _Given(w, form, sources), cos_theta)}
 
 
 def twin_of(group, twin, inputs):

@@ -28,18 +28,17 @@ class Picture:
     """Tables with several rows: a data image with the rows above one another and red, green and
     blue side by side, which every engine interpolates linearly between pixels."""
 
-    def __init__(self, wiring, tables, cos_theta, place, name):
-        """`place`: output with the position between the first row and the last, from 0 to 1.
-        `name`: of the image."""
+    def __init__(self, wiring, tables, cos_theta, name):
+        """`name`: of the image."""
         self.wiring = wiring
         count, width = len(tables[0]), len(tables[0][0])
         height = count * math.ceil(len(tables) / 3)
         pixels = np.ones((height, width, 4), np.float32)
-        self.where, self.bands = {}, {}
+        self.where = {}
         for i, rows in enumerate(tables):
             band, channel = divmod(i, 3)
             pixels[band * count : (band + 1) * count, :, channel] = rows
-            self.where[id(rows)] = band, channel
+            self.where.setdefault(id(rows), (band, channel))
         self.image = bpy.data.images.new(name, width, height, float_buffer=True, is_data=True)
         self.image.use_half_precision = False
         self.image.alpha_mode = "NONE"
@@ -47,18 +46,31 @@ class Picture:
         self.image.pack()
         # From the centre of the first pixel to the centre of the last.
         self.u = wiring.math("MULTIPLY_ADD", cos_theta, (width - 1) / width, 0.5 / width)
-        self.v = wiring.math("MULTIPLY", place, (count - 1) / height)
-        self.first, self.step = 0.5 / height, count / height
+        self.count, self.height = count, height
+
+    def at(self, place, skipped=0.0):
+        """The tables at a place between the first row and the last, an output from 0 to 1.
+        `skipped`: the rows above those of the first tables, an output or a number."""
+        v = self.wiring.math("MULTIPLY_ADD", place, float(self.count - 1), skipped)
+        return _Place(self, self.wiring.math("MULTIPLY", v, 1 / self.height))
+
+
+class _Place:
+    """Tables of a picture at one place."""
+
+    def __init__(self, picture, v):
+        self.picture, self.v, self.bands = picture, v, {}
 
     def look_up(self, rows):
-        band, channel = self.where[id(rows)]
+        picture, w = self.picture, self.picture.wiring
+        band, channel = picture.where[id(rows)]
         if band not in self.bands:
-            w = self.wiring
+            first = (0.5 + band * picture.count) / picture.height
             at = w.node("ShaderNodeCombineXYZ")
-            w.give(at.inputs["X"], self.u)
-            w.give(at.inputs["Y"], w.math("ADD", self.v, self.first + band * self.step))
+            w.give(at.inputs["X"], picture.u)
+            w.give(at.inputs["Y"], w.math("ADD", self.v, first))
             texture = w.node("ShaderNodeTexImage", interpolation="Linear", extension="EXTEND")
-            texture.image = self.image
+            texture.image = picture.image
             w.give(texture.inputs["Vector"], at.outputs["Vector"])
             parts = w.node("ShaderNodeSeparateColor")
             w.give(parts.inputs["Color"], texture.outputs["Color"])
@@ -143,7 +155,7 @@ def wire(tree, data, normal, parameters, name):
     across = w.vector("CROSS_PRODUCT", normal, viewer)
     place = place_on_axis(w, axis, parameters[axis["parameter"]]) if axis else None
     if axis:
-        tables = Picture(w, list(_tables(data)), cos_theta, place, name)
+        tables = Picture(w, list(_tables(data)), cos_theta, name).at(place)
     else:
         tables = _Curves(w, cos_theta)
     looked = Looked(w, tables)

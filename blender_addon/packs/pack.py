@@ -16,8 +16,8 @@ _INSTALLED = extension.ROOT
 #: Folder that models are read from; see use().
 root = _INSTALLED
 FORMAT = 1
-#: To be increased when nodes.py, twin.py or stand_in.py changes how it wires nodes.
-WIRING = 2
+#: To be increased when code in content/ changes how it wires nodes.
+WIRING = 3
 
 #: Custom property of a node group: its model, its representation and its sockets' identifiers.
 TAG = "brdfc"

@@ -7,7 +7,7 @@
 namespace brdfc::measure {
 
 struct AlbedoTableSettings {
-  std::size_t code = 1;  ///< increase when a change of the code changes the tables
+  std::size_t code = 2;  ///< increase when a change of the code changes the tables
   /// Smallest view cosine on the axis; smaller ones are clamped. They belong to views within 0.06 degrees of the
   /// horizon.
   double min_cos = 1e-3;
@@ -27,6 +27,13 @@ struct AlbedoTableSettings {
   /// Options of the quadrature over directions that validates a table, as in AlbedoOptions.
   double proof_error = 1e-6;
   std::size_t proof_cells = 2000, proof_witnesses = 1 << 15;
+  /// Samples for each lobe in the search for coefficients of which one grid serves several choices, and the most by
+  /// which two may differ as far as noise explains it.
+  std::size_t share_samples = 4096;
+  double share_noise = 1e-2;
+  /// The most by which noise may explain that a coefficient changes along an axis.
+  double axis_noise = 1e-2;
+  double max_error = 0.1;   ///< tables with a larger error are refused
   std::size_t corners = 4;  ///< probes near the ends of all ranges at once
 };
 inline constexpr AlbedoTableSettings kTableSettings;

@@ -57,6 +57,9 @@ class Tabulator {
     for (const ParamValues& combination : combinations_) terms.push_back(terms_of(combination));
     for (const std::size_t c : stands_for_) table_.terms.push_back(terms[c]);
     prove();
+    if (table_.error > kTableSettings.max_error)
+      throw ValueError(fmt::format("{}: the albedo interpolated in tables is wrong by {:.2g}, expected at most {:g}",
+                                   model_.info().name, table_.error, kTableSettings.max_error));
     describe();
     return std::move(table_);
   }
@@ -109,8 +112,9 @@ class Tabulator {
     // Coefficients at the probes, and along each coordinate through each probe.
     constexpr int kSteps = 4;
     std::vector<Coefficients> at_probe(places_.size());
-    for_all(places_.size(),
-            [&](std::size_t i) { at_probe[i] = polynomial_.coefficients(combination, places_[i], kAllAzimuths); });
+    for_all(places_.size(), [&](std::size_t i) {
+      at_probe[i] = polynomial_.coefficients(combination, places_[i], kAllAzimuths, kTableSettings.share_samples);
+    });
 
     std::vector<NewTerm> wanted;
     for (int mirror = 0; mirror < 2; ++mirror)
@@ -141,10 +145,11 @@ class Tabulator {
         x[p] = polynomial_.coordinates()[p].at(double(step) / (kSteps - 1));
         const Coefficients c = polynomial_.coefficients(combination, x, kAllAzimuths);
         const std::lock_guard lock(mutex);
-        for (std::size_t t = 0; t < missing.size(); ++t)
-          if (max_abs(missing[t].monomial.in(c)-missing[t].monomial.in(at_probe[i])) >
-              kTableSettings.same + 7 * (missing[t].monomial.error_in(c) + missing[t].monomial.error_in(at_probe[i])))
-            depends[t][p] = 1;
+        for (std::size_t t = 0; t < missing.size(); ++t) {
+          const Monomial& m = missing[t].monomial;
+          const double noise = std::min(7 * (m.error_in(c) + m.error_in(at_probe[i])), kTableSettings.axis_noise);
+          if (max_abs(m.in(c)-m.in(at_probe[i])) > kTableSettings.same + noise) depends[t][p] = 1;
+        }
       });
       for (std::size_t t = 0; t < missing.size(); ++t)
         for (std::size_t p = 0; p < polynomial_.coordinates().size(); ++p)
@@ -168,9 +173,10 @@ class Tabulator {
     const auto same = [&](std::size_t g, double offset, double sign, double tolerance) {
       for (std::size_t i = 0; i < at_probe.size(); ++i) {
         const Rgb<double> wanted = Rgb<double>(offset) + signatures_[g][i] * sign;
-        if (max_abs(t.monomial.in(at_probe[i]) - wanted) >
-            tolerance + kTableSettings.same + 14 * t.monomial.error_in(at_probe[i]))
-          return false;
+        // What is the same coefficient of two choices is mostly computed with the same samples, and equal but for
+        // rounding. So where samples are few, it need not be taken for the same because of its noise.
+        const double noise = std::min(14 * t.monomial.error_in(at_probe[i]), kTableSettings.share_noise);
+        if (max_abs(t.monomial.in(at_probe[i]) - wanted) > tolerance + kTableSettings.same + noise) return false;
       }
       return true;
     };

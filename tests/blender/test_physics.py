@@ -535,3 +535,44 @@ def test_albedo_output_panel_and_model_agree(extension, empty, tool, model, valu
         meter = Goniometer(scene, material, tilted(cosines, 0.7), samples=4)
         shader = meter.measure()
         assert np.abs(shader - expected).max() < 2e-5
+
+
+#: Widths other than the defaults, even and uneven.
+WIDTHS = {
+    "microfacet": [{"ax": 0.7, "ay": 0.7}, {"ax": 0.05, "ay": 0.6}],
+    "ward": [{"ax": 0.5, "ay": 0.5}, {"ax": 0.05, "ay": 0.6}],
+    "ashikhmin_shirley": [{"nu": 3.0, "nv": 3.0}, {"nu": 5.0, "nv": 1000.0}],
+}
+
+
+@pytest.mark.parametrize(
+    "model",
+    [*WIDTHS, "charlie", "coupled", "glossy_reflector", "glossy_specular", "oren_nayar"],
+)
+def test_the_albedo_output_without_osl_follows_choices_and_widths(extension, empty, model):
+    cosines = np.linspace(0.1, 1, 10)
+    parameters = extension.pack.model(model).parameters
+    choices = [
+        {name: choice}
+        for name, parameter in parameters.items()
+        for choice in parameter.get("choices", ())
+    ]
+    form = extension.pack.model(model).native_form
+    choices = [choice for choice in choices if form.refusal(choice) is None]
+    for widths in WIDTHS.get(model, [{}]):
+        for values in ({**widths, **choice} for choice in choices):
+            bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+            scene, material = start(extension, model, "nodes", values, max_bounces=0)
+            scene.cycles.shading_system = False
+            tree = material.node_tree
+            (node,) = extension.model_nodes.group_nodes(material)
+            output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+            emission = tree.nodes.new("ShaderNodeEmission")
+            tree.links.new(node.outputs["Albedo"], emission.inputs["Color"])
+            tree.links.new(emission.outputs[0], output.inputs["Surface"])
+            shown = Goniometer(scene, material, tilted(cosines, 0.7), samples=4).measure()
+            expected = [extension.api.albedo(model, c, **values) for c in cosines]
+            off = np.abs(shown - expected).max()
+            print(f"{model} {values}: {off:.2g}")
+            # The mean of three isotropic albedos stands for uneven widths.
+            assert off < (0.035 if len(set(widths.values())) > 1 else 0.01)

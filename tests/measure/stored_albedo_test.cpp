@@ -13,9 +13,12 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "measure/albedo.h"
 #include "measure/albedo_file.h"
+#include "measure/bound_model.h"
 #include "measure/probes.h"
 #include "measure/tabulate_albedo.h"
+#include "model/choices.h"
 #include "support.h"
 #include "tables/table_file.h"
 
@@ -95,6 +98,37 @@ TEST(StoredAlbedos, AreReadNumberForNumber) {
       for (const TableAxis& axis : g.axes) scales.insert(axis.scale);
   }
   EXPECT_EQ(scales.size(), 3u) << "linear, log and log1p";
+}
+
+/// A grid may serve several choices only if they reflect the same light: at the middle of the sliders, and where a lobe
+/// is as wide as they allow.
+TEST(StoredAlbedos, AreThoseOfEachChoice) {
+  std::size_t combinations = 0;
+  for (const Model* model : stored()) {
+    const AlbedoTable table = albedo_table_of(*model);
+    for (const Choices& choices : choice_combinations(model->info())) {
+      ++combinations;
+      for (const bool wide : {false, true}) {
+        ParamValues values = with_choices(model->info(), choices);
+        for (const ParamInfo& p : model->info().params) {
+          if (p.kind == ParamKind::Color) values[p.name] = std::array<double, 3>{0.7, 0.7, 0.7};
+          if (wide && (p.name == "ax" || p.name == "ay" || p.name == "alpha" || p.name == "r")) values[p.name] = 0.8;
+          if (wide && (p.name == "nu" || p.name == "nv")) values[p.name] = 3.;
+        }
+        const auto brdf = bind_model(*model, values).brdf;
+        for (const double c : {0.2, 0.9}) {
+          constexpr int kAzimuths = 8;
+          double sum = 0;
+          for (int i = 0; i < kAzimuths; ++i)
+            sum += albedo(*brdf, c, 2 * kPi * (i + 0.5) / kAzimuths, "", {1e-4, 1000, 1 << 12}).total().g / kAzimuths;
+          EXPECT_NEAR(lookup(table, *model, values, c).g, sum, 0.025)
+              << model->info().name << " " << format_values(model->info(), complete(model->info(), values)) << " at "
+              << c;
+        }
+      }
+    }
+  }
+  EXPECT_GT(combinations, 60u);
 }
 
 /// Tests one model, selected by BRDFC_CELL: script/test sets it to the commit, so that all are tested in the course of
