@@ -29,7 +29,8 @@ void add_stability_command(Command app) {
              "Evaluations and samples, over all models, to search for invalid values");
   add_number(cmd, "--limit", o->limit, {.low = 0},
              "Rounding that a formula may add to that of its inputs, in units of epsilon");
-  cmd.add_option("--maps", o->maps, "Folder for maps of the errors, and maps.json, which describes them");
+  cmd.add_option("--maps", o->maps,
+                 "Folder for maps of the errors of these models, and maps.json, which describes them");
   add_number(cmd, "--seed", o->hunt.seed, {}, "Seed of parameters and directions");
   cmd.callback([o] {
     const std::vector<const Model*> chosen = models_named(o->model);
@@ -50,7 +51,7 @@ void add_stability_command(Command app) {
                  std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), hunted);
     }
     if (!o->maps.empty()) {
-      report::write_stability_maps(o->maps);
+      report::write_stability_maps(o->maps, chosen);
       fmt::print(stderr, "wrote {}/maps.json and its pictures\n", o->maps);
     }
     std::fflush(stdout);

@@ -219,7 +219,7 @@ Figure figure_of(const Model& model) {
 
 }  // namespace
 
-void write_stability_maps(const std::string& dir) {
+void write_stability_maps(const std::string& dir, std::span<const Model* const> chosen) {
   std::error_code error;
   std::filesystem::create_directories(dir, error);
   if (error) throw InputError(fmt::format("{}: expected a folder that can be written: {}", dir, error.message()));
@@ -229,8 +229,10 @@ void write_stability_maps(const std::string& dir) {
     write_map(dir + "/" + picture, f.map);
     maps.push_back({{"picture", picture}, {"title", f.title}, {"x", f.x}, {"y", f.y}});
   };
-  for (const Figure& f : printed_forms()) add(printed, f);
-  for (const auto& [name, model] : models())
+  for (const Figure& f : printed_forms())
+    if (std::ranges::any_of(chosen, [&](const Model* m) { return f.file.starts_with(m->info().name + "_"); }))
+      add(printed, f);
+  for (const Model* model : chosen)
     if (model->has_scatter()) add(of_models, figure_of(*model));
   for (int e = -16; e <= 0; e += 2) colors.push_back({{"exponent", e}, {"rgb", bytes(color_of(std::pow(10., e)))}});
   const nlohmann::ordered_json out{{"format", 1},

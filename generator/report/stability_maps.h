@@ -3,13 +3,16 @@
 // parameter.
 #pragma once
 
+#include <span>
 #include <string>
+
+#include "model/model.h"
 
 namespace brdfc::report {
 
-/// Writes each map as DIR/NAME.png, and DIR/maps.json: their titles and axes, and the colours of errors.
+/// Writes maps of these models as DIR/NAME.png, and DIR/maps.json: their titles and axes, and the colours of errors.
 /// `python -m pages.stability DIR` in script/ makes a page of them. Throws InputError that names the path that can't be
 /// written.
-void write_stability_maps(const std::string& dir);
+void write_stability_maps(const std::string& dir, std::span<const Model* const>);
 
 }  // namespace brdfc::report

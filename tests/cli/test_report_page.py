@@ -374,6 +374,10 @@ def test_maps_of_rounding_errors_have_their_page(tmp_path):
         '<li style="background:rgb(9,8,7)">10<sup>−16</sup></li>' in text and "<b>Ward</b>" in text
     )
     assert 'src="a%20b.png"' in text and "http" not in text
+    assert "as printed" in text
+    (tmp_path / "maps.json").write_text(json.dumps(maps | {"printed": []}))
+    stability.write(tmp_path)
+    assert "as printed" not in (tmp_path / "index.html").read_text(encoding="utf-8")
     (tmp_path / "maps.json").write_text(json.dumps(maps | {"format": 2}))
     with pytest.raises(ValueError, match="maps.json: format: expected one of 1, got 2"):
         stability.write(tmp_path)
