@@ -4,7 +4,7 @@
 
 Runs in an environment with OpenImageIO and flip-evaluator, the published implementation of P.
 Andersson et al.: Visualizing and Communicating Errors in Rendered Images, Ray Tracing Gems II,
-2021. `brdfc report` shows the numbers.
+2021. `brdfc report` reads the numbers.
 """
 
 import argparse

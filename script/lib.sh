@@ -147,6 +147,16 @@ setup_farm() {
   setup_env farm 3.11 || die "Python 3.11 was not found"
 }
 
+# setup_page: installs what makes pages: Jinja, and Matplotlib for their charts.
+setup_page() {
+  find_python 3.11 >/dev/null || install_packages python3.11 python3.11-venv
+  setup_env page 3.11 || die "Python 3.11 was not found"
+}
+
+# make_page report|stability DIR: writes DIR/index.html about what `brdfc report DIR`, or `brdfc stability --maps DIR`, wrote
+# there.
+make_page() { "$ENVS/page/bin/python" -m "pages.$1" "$2"; }
+
 # ---- build -----------------------------------------------------------------------------------------------
 
 # slowest_sources FOLDER: the five sources in FOLDER that took longest to compile, in seconds of processor time, and the sum of

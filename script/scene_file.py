@@ -1,55 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a resolved scene file holds: values that know where they stand in it, and the meshes, camera
-and lamps that Blender makes of them."""
+"""What a resolved scene file holds, and the meshes, camera and lamps that Blender makes of it."""
 
 import math
 from pathlib import Path
 
 import bpy
+import json_view
 import numpy as np
 from mathutils import Euler, Matrix, Vector
 
 
-class View:
-    """A JSON value that knows its file and key, for error messages."""
-
-    def __init__(self, value, file, path=""):
-        self.value, self.file, self.path = value, file, path
-
-    def error(self, expected):
-        where = self.path or "the top level"
-        return ValueError(f"{self.file}: {where}: expected {expected}, got {self.value!r:.80}")
-
-    def _child(self, key):
-        path = f"{self.path}.{key}" if self.path else str(key)
-        return View(self.value[key], self.file, path)
-
-    def has(self, key):
-        return isinstance(self.value, dict) and self.value.get(key) is not None
-
-    def get(self, key):
-        if not isinstance(self.value, dict):
-            raise self.error("an object")
-        if key not in self.value:
-            raise self.error(f"an object with {key!r}")
-        return self._child(key)
-
-    def items(self):
-        if isinstance(self.value, dict):
-            return [(key, self._child(key)) for key in self.value]
-        if isinstance(self.value, list):
-            return [(index, self._child(index)) for index in range(len(self.value))]
-        raise self.error("an object or a list")
-
-    def number(self):
-        if isinstance(self.value, bool) or not isinstance(self.value, int | float):
-            raise self.error("a number")
-        return float(self.value)
-
-    def text(self):
-        if not isinstance(self.value, str):
-            raise self.error("a text")
-        return self.value
+class View(json_view.View):
+    """A value of a scene file."""
 
     def numbers(self, count):
         if not isinstance(self.value, list) or len(self.value) != count:

@@ -11,8 +11,8 @@ namespace brdfc::app {
 void add_report_command(Command app) {
   const Command command = app.add_subcommand(
       "report",
-      "Write index.html, report.json and report.csv about the scenes rendered in the folders of DIR. Includes the\n"
-      "tables that the closure tests write to conformance/ beside DIR");
+      "Compare the scenes rendered in the folders of DIR with their references, and write report.json, report.csv and\n"
+      "pictures to look at. script/report makes a page of them");
   const auto folder = std::make_shared<std::string>();
   command.add_option("DIR", *folder, "A folder with one folder per scene, each with a runs.json").required();
   command.callback([folder] {
@@ -20,7 +20,7 @@ void add_report_command(Command app) {
       fmt::print(stderr, "brdfc: {}: left out, it was not rendered: it has no runs.json\n", scene.string());
     const std::vector<report::SceneReport> scenes = report::write_report(*folder);
     fmt::print(stdout, "{}", report::report_csv(scenes));
-    fmt::print(stderr, "wrote {}/index.html, report.json and report.csv\n", *folder);
+    fmt::print(stderr, "wrote {}/report.json and report.csv\n", *folder);
   });
 }
 

@@ -7,13 +7,13 @@
 #include "app/commands.h"
 #include "app/numbers.h"
 #include "measure/stability.h"
-#include "report/stability_page.h"
+#include "report/stability_maps.h"
 
 namespace brdfc::app {
 
 void add_stability_command(Command app) {
   struct Options {
-    std::string model, page;
+    std::string model, maps;
     measure::Hunt hunt;
     long calls = 1000000;
     double limit = 32;
@@ -29,7 +29,8 @@ void add_stability_command(Command app) {
              "Evaluations and samples, over all models, to search for invalid values");
   add_number(cmd, "--limit", o->limit, {.low = 0},
              "Rounding that a formula may add to that of its inputs, in units of epsilon");
-  cmd.add_option("--page", o->page, "Folder for a page with maps of the errors");
+  cmd.add_option("--maps", o->maps,
+                 "Folder for maps of the errors of these models, and maps.json, which describes them");
   add_number(cmd, "--seed", o->hunt.seed, {}, "Seed of parameters and directions");
   cmd.callback([o] {
     const std::vector<const Model*> chosen = models_named(o->model);
@@ -49,9 +50,9 @@ void add_stability_command(Command app) {
       fmt::print("  {:.1f} s, {:.1f} s of them for rounding\n",
                  std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), hunted);
     }
-    if (!o->page.empty()) {
-      report::write_stability_page(o->page);
-      fmt::print(stderr, "{}/index.html\n", o->page);
+    if (!o->maps.empty()) {
+      report::write_stability_maps(o->maps, chosen);
+      fmt::print(stderr, "wrote {}/maps.json and its pictures\n", o->maps);
     }
     std::fflush(stdout);
     if (failed > 0) throw CheckFailed(fmt::format("{} models lose digits", failed));

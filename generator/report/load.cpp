@@ -19,12 +19,6 @@ namespace fs = std::filesystem;
 constexpr double kMost = 1e12;  // limit of seconds, samples and errors: larger figures are mistakes
 constexpr int kMostCount = 1'000'000'000;
 
-double median(std::vector<double> v) {
-  std::sort(v.begin(), v.end());
-  const std::size_t half = v.size() / 2;
-  return v.size() % 2 ? v[half] : (v[half - 1] + v[half]) / 2;
-}
-
 Rendering read_picture(const fs::path& folder, const JsonView& name) {
   const fs::path file = folder / name.text();
   if (!fs::exists(file)) name.fail("the name of an image in " + folder.string());
@@ -273,15 +267,6 @@ std::optional<double> FormReport::relative_l1() const {
   for (const MaterialForm& m : materials)
     if (m.relative_l1) worst = std::max(worst.value_or(0), *m.relative_l1);
   return worst;
-}
-
-std::map<std::string, std::string> load_links(const fs::path& folder) {
-  const fs::path file = folder / "links.json";
-  std::map<std::string, std::string> links;
-  if (!fs::exists(file)) return links;
-  const nlohmann::json content = reference::read_json(file);
-  for (const auto& [name, address] : JsonView(content, file.string()).members()) links[name] = address.text();
-  return links;
 }
 
 std::vector<fs::path> not_rendered(const fs::path& folder) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The report: error against run time for every scene and form, as a page, as JSON and as CSV.
+// The report: error against run time for every scene and form, as JSON and as CSV. script/report makes its page.
 //
 // Input: a folder with one folder for each scene, which contains `runs.json` and the images that it names:
 //
@@ -34,9 +34,6 @@
 //   }
 //
 // An optional file flip.json beside it contains {"FORM": mean FLIP of its picture against the reference, ...}.
-//
-// An optional file links.json in the report's folder contains {"TEXT": "../demo-5.0/index.html", ...}: pages of the
-// same scenes in other versions of Blender, which are linked at the top of the page.
 //
 // CPU times of different forms are comparable if images with the same index were rendered in turns in one process. The
 // cost of a form is its CPU time divided by that of "glossy", as the median over the images. If the images for
@@ -123,27 +120,7 @@ std::vector<std::filesystem::path> not_rendered(const std::filesystem::path& fol
 /// the key if something is missing or malformed, or if an image is not finite.
 std::vector<SceneReport> load_report(const std::filesystem::path& folder);
 
-/// Results of the closure conformance tests for one closure.
-struct ConformanceRow {
-  std::string closure;
-  std::string verdict;                  ///< "ok", "fault", or "mended" for a known fault that no longer occurs
-  std::optional<double> evaluation_l1;  ///< evaluation against this project's definition; nullopt for deltas
-  double sampling_share = 0;            ///< light by its own sampling / light by evaluation - 1; 0 if within noise
-  double sampling_resolution = 0;       ///< smallest difference that would have been detected
-  std::string fault;                    ///< description of the fault
-};
-struct ConformanceTable {
-  std::string blender;  ///< version
-  std::vector<ConformanceRow> rows;
-};
-
-/// Reads the tables that tests/blender/test_conformance.py writes, one VERSION.json each; empty if there is no such
-/// folder. Throws InputError that names file and key.
-std::vector<ConformanceTable> load_conformance(const std::filesystem::path& folder);
-/// Appends the page's section about closures; nothing if there are no tables.
-void put_conformance(std::string& page, const std::vector<ConformanceTable>&);
-
-/// Preview images for the page. Names are relative to the report's folder.
+/// Preview images. Names are relative to the report's folder.
 struct Previews {
   struct Form {
     std::string picture, difference;
@@ -159,18 +136,12 @@ struct Previews {
 /// Writes the PNG files of one scene to folder/scene.
 Previews write_previews(const std::filesystem::path& folder, const SceneReport&);
 
-/// Links to other pages, by their text; empty if there is no links.json in the folder. Throws InputError that names
-/// file and key.
-std::map<std::string, std::string> load_links(const std::filesystem::path& folder);
-
-/// The HTML of the page. `previews` are in the order of `scenes`.
-std::string report_html(const std::vector<SceneReport>& scenes, const std::vector<Previews>& previews,
-                        const std::vector<ConformanceTable>& closures, const std::map<std::string, std::string>& links);
-std::string report_json(const std::vector<SceneReport>& scenes);
+/// report.json: every measurement, what it means (verdict.h), and the names of the previews, which are in the order of
+/// `scenes`. What it says is said nowhere else: the page states these facts and computes none.
+std::string report_json(const std::vector<SceneReport>& scenes, const std::vector<Previews>& previews);
 std::string report_csv(const std::vector<SceneReport>& scenes);
 
-/// Writes index.html, report.json, report.csv and the previews. Results of the conformance tests are read from the
-/// folder `conformance` beside this one, if it exists. Throws as load_report(), and InputError if the folder can't be
+/// Writes report.json, report.csv and the previews. Throws as load_report(), and InputError if the folder can't be
 /// written. Returns the measured scenes.
 std::vector<SceneReport> write_report(const std::filesystem::path& folder);
 

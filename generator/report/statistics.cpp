@@ -107,6 +107,14 @@ template <class Value> Estimate estimate(std::size_t count, const Value& value) 
 
 }  // namespace
 
+double median(std::vector<double> v) {
+  std::sort(v.begin(), v.end());
+  const std::size_t half = v.size() / 2;
+  return v.size() % 2 ? v[half] : (v[half - 1] + v[half]) / 2;
+}
+
+bool Difference::biased() const { return std::abs(bias) > 3 * bias_error && std::abs(bias) > 1e-5; }
+
 bool WelchTest::passed() const { return accepted() >= kTestAccepted && rejected_tiles == 0; }
 
 nlohmann::ordered_json to_json(const WelchTest& t) {

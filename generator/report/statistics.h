@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "reference/image.h"
 
@@ -16,6 +17,9 @@ namespace brdfc::report {
 /// none or if sizes differ.
 reference::Rendering mean_of(std::span<const reference::Rendering>);
 
+/// The median of numbers, of which there must be one at least; of an even count the mean of the middle two.
+double median(std::vector<double>);
+
 /// Regularises relMSE where the reference is black. The same number is used in Comparison.
 inline constexpr double kRelMseEpsilon = 0.01;
 
@@ -24,6 +28,9 @@ struct Difference {
   double noise = 0;       ///< expected rel_mse if both pictures had the same expectation
   double bias = 0;        ///< (mean a - mean b) / mean b
   double bias_error = 0;  ///< one standard deviation of `bias`, from the variance layers
+
+  /// True if the bias exceeds three standard deviations, which noise alone does once in 370 cases, and rounding.
+  bool biased() const;
 };
 
 /// Compares a picture with its reference. A picture without a variance layer counts as free of noise. Throws InputError

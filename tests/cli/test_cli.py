@@ -14,6 +14,7 @@ import math
 import os
 import re
 import shutil
+import struct
 import subprocess
 import sys
 
@@ -541,12 +542,25 @@ def test_stability_reports_the_worst_place_and_fails_beyond_the_limit():
     assert "FAILED: expected at most 0.1 units" in strict.stdout
 
 
-def test_stability_page_refuses_a_folder_that_cannot_be(tmp_path):
+def test_stability_draws_maps(tmp_path):
+    few = ("stability", "lambert", "--points", "100", "--calls", "100")
+    assert run(*few, "--maps", str(tmp_path / "maps")).returncode == 0
+    maps = json.loads((tmp_path / "maps" / "maps.json").read_text(encoding="utf-8"))
+    assert maps["format"] == 1 and maps["printed"] == []
+    (only,) = maps["models"]
+    assert only["title"] == "Lambert" and only["picture"] == "lambert.png"
+    assert only["x"] == "cos theta_o from 1e-6 to 1, logarithmic" and only["y"]
+    assert [color["exponent"] for color in maps["colors"]] == list(range(-16, 1, 2))
+    start = (tmp_path / "maps" / "lambert.png").read_bytes()[:24]
+    assert struct.unpack(">II", start[16:]) == (maps["width"], maps["height"])
+
+
+def test_stability_maps_refuse_a_folder_that_cannot_be(tmp_path):
     (tmp_path / "file").write_text("")
     few = ("stability", "lambert", "--points", "100", "--calls", "100")
-    result = run(*few, "--page", str(tmp_path / "file" / "page"))
+    result = run(*few, "--maps", str(tmp_path / "file" / "maps"))
     assert result.returncode == 2
-    assert f"{tmp_path}/file/page: expected a folder that can be written" in result.stderr
+    assert f"{tmp_path}/file/maps: expected a folder that can be written" in result.stderr
 
 
 # ---- fit ----------------------------------------------------------------------------------------

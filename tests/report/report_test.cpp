@@ -8,7 +8,6 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <random>
-#include <regex>
 
 #include "core/error.h"
 #include "reference/color.h"
@@ -142,108 +141,75 @@ TEST_F(ReportTest, TakesTheWorstMaterial) {
   EXPECT_EQ(load()[0].forms[0].closures(), std::nullopt);
 }
 
-TEST_F(ReportTest, WritesPageJsonAndCsv) {
+TEST_F(ReportTest, WritesJsonCsvAndPreviews) {
   load();
   write_report(folder_);
   std::ifstream json_file(folder_ / "report.json");
   const json report = json::parse(json_file);
-  EXPECT_EQ(report["scenes"][0]["forms"][1]["cost"], 1.5);
-  EXPECT_EQ(report["scenes"][0]["forms"][0]["closures"], json());
-  const auto text = [&](const char* name) {
-    std::ifstream in(folder_ / name);
-    return std::string(std::istreambuf_iterator<char>(in), {});
-  };
-  EXPECT_THAT(text("report.csv"), HasSubstr("\nball,exact,"));
-  const std::string page = text("index.html");
-  EXPECT_THAT(page, HasSubstr("a &lt;ball&gt; &amp; more"));
-  for (const char* name : {"ball/reference.png", "ball/exact.png", "ball/exact-difference.png", "ball/glossy.png"}) {
-    EXPECT_THAT(page, HasSubstr(fmt::format("src=\"{}\"", name)));
-    const Image preview = reference::read_image(folder_ / name, reference::ColorConfig::current());
-    EXPECT_EQ(preview.width, kSize);
-  }
-  EXPECT_THAT(page, testing::Not(HasSubstr("http")));  // self-contained
+  const json& scene = report["scenes"][0];
+  EXPECT_EQ(scene["description"], "a <ball> & more");
+  EXPECT_EQ(scene["forms"][1]["cost"], 1.5);
+  EXPECT_EQ(scene["forms"][0]["closures"], json());
+  std::ifstream csv_file(folder_ / "report.csv");
+  EXPECT_THAT(std::string(std::istreambuf_iterator<char>(csv_file), {}), HasSubstr("\nball,exact,"));
+  std::vector<std::string> names{scene["reference"]["preview"]};
+  for (const json& form : scene["forms"])
+    for (const json& name : form["previews"]) names.push_back(name);
+  EXPECT_THAT(names, testing::IsSupersetOf({"ball/reference.png", "ball/exact.png", "ball/exact-difference.png",
+                                            "ball/glossy.png", "ball/glossy-p-values.png"}));
+  for (const std::string& name : names)
+    EXPECT_EQ(reference::read_image(folder_ / name, reference::ColorConfig::current()).width, kSize) << name;
   for (const auto& entry : fs::recursive_directory_iterator(folder_))
     EXPECT_NE(entry.path().filename().string().front(), '.') << entry.path() << ": a temporary file was left";
 }
 
-TEST_F(ReportTest, LinksOtherVersionsOfBlender) {
-  load();
-  EXPECT_TRUE(load_links(folder_).empty());
-  std::ofstream(folder_ / "links.json") << json{{"Blender 5.0", "../demo-5.0/index.html"}, {"<x>", "a\"b"}};
-  write_report(folder_);
-  std::ifstream in(folder_ / "index.html");
-  const std::string page{std::istreambuf_iterator<char>(in), {}};
-  EXPECT_THAT(page, HasSubstr("<a href=\"../demo-5.0/index.html\">Blender 5.0</a>"));
-  EXPECT_THAT(page, HasSubstr("<a href=\"a&quot;b\">&lt;x&gt;</a>"));
-
-  std::ofstream(folder_ / "links.json") << json{{"Blender 5.0", 5}};
-  try {
-    load_links(folder_);
-    FAIL() << "a number was accepted for an address";
-  } catch (const InputError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("links.json: Blender 5.0"));
-  }
-}
-
-TEST_F(ReportTest, NamesInTheChartLieBesideEachOther) {
-  for (const char* form : {"sampled", "planned", "aimed", "twin"}) {
-    runs_["runs"].push_back(runs_["runs"][1]);
-    runs_["runs"].back()["form"] = form;
-  }
+/// What the page says stands in report.json, so that it computes nothing.
+TEST_F(ReportTest, JsonSaysWhatTheMeasurementsMean) {
+  runs_["runs"].push_back(runs_["runs"][1]);
+  runs_["runs"].back()["form"] = "sampled";
+  runs_["runs"].back()["images"] = {"dark.exr"};  // no test of a single picture
+  for (const char* times : {"cpu_seconds", "wall_seconds"}) runs_["runs"].back()[times] = {4.0};
+  reference::write_rendering(folder_ / "ball/dark.exr", picture(0.5, 0, 0));
   load();
   write_report(folder_);
-  std::ifstream in(folder_ / "index.html");
-  const std::string page{std::istreambuf_iterator<char>(in), {}};
-  struct Name {
-    double x, y;
-    std::string text;
-  };
-  std::vector<Name> names;
-  const std::regex pattern("class=\"name\" x=\"([0-9.]+)\" y=\"([0-9.]+)\">([^<]+)<");
-  for (auto it = std::sregex_iterator(page.begin(), page.end(), pattern); it != std::sregex_iterator(); ++it)
-    names.push_back({std::stod((*it)[1]), std::stod((*it)[2]), (*it)[3]});
-  ASSERT_EQ(names.size(), 6u);
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    EXPECT_GT(names[i].y, 12) << names[i].text << " lies above the picture";
-    for (std::size_t j = 0; j < i; ++j)
-      // Letters are 12 pixels high, and about half as wide.
-      EXPECT_TRUE(std::abs(names[i].y - names[j].y) >= 12 ||
-                  names[i].x + 6.0 * double(names[i].text.size()) < names[j].x ||
-                  names[j].x + 6.0 * double(names[j].text.size()) < names[i].x)
-          << names[i].text << " lies on " << names[j].text;
-  }
+  std::ifstream file(folder_ / "report.json");
+  const json report = json::parse(file);
+  EXPECT_EQ(report["format"], 2);
+  EXPECT_EQ(report["equal_error_at"], json({16, 256, 1024}));
+  EXPECT_EQ(report["test"]["tile"], kTestTile);
+  EXPECT_EQ(report["forms"], json::parse(R"([{"form": "glossy", "label": "Blender's Glossy node", "native": true},
+                                             {"form": "exact", "label": "exact", "native": false},
+                                             {"form": "sampled", "label": "sampled", "native": false}])"));
+  const json& scene = report["scenes"][0];
+  EXPECT_EQ(scene["default_form"], "exact");
+  EXPECT_EQ(scene["models"], json({"coupled", "lambert"}));
+  EXPECT_EQ(scene["exposure"], 0);
+  EXPECT_GT(scene["difference_scale"], 0.3);  // half of the brightest light, 0.4
+  const json &glossy = scene["forms"][0], &exact = scene["forms"][1], &sampled = scene["forms"][2];
+  EXPECT_EQ(glossy["label"], "Blender's Glossy node");
+  for (const char* key : {"native", "biased", "differs", "pareto"}) EXPECT_EQ(glossy[key], true) << key;
+  for (const char* key : {"native", "biased", "differs"}) EXPECT_EQ(exact[key], false) << key;
+  EXPECT_EQ(exact["pareto"], true);
+  EXPECT_EQ(exact["test"]["rejected_tiles"], 0);
+  EXPECT_EQ(exact["previews"]["equal_time"], "ball/exact-equal-time.png");
+  EXPECT_EQ(exact["equal_time"]["images"], 3);
+  EXPECT_EQ(sampled["differs"], true);
+  EXPECT_EQ(sampled["pareto"], false) << "exact takes less time, and has a smaller error";
+  EXPECT_EQ(sampled["test"], json());
+  EXPECT_EQ(sampled["previews"]["p_values"], json());
+  const json& verdict = report["verdict"];
+  EXPECT_EQ(verdict["judged"], 1);
+  EXPECT_EQ(verdict["same"], 1);
+  EXPECT_EQ(verdict["costs"], 1);
+  EXPECT_EQ(verdict["cost"], json({{"median", 1.5}, {"least", 1.5}, {"most", 1.5}}));
+  EXPECT_EQ(verdict["worst_bias"]["form"], "sampled");
+  EXPECT_EQ(verdict["worst_bias"]["scene"], "ball");
+  EXPECT_NEAR(verdict["worst_bias"]["bias"], -0.5, 1e-3);
 }
 
-TEST_F(ReportTest, ShowsWhatTheClosuresOfEachVersionDo) {
-  const fs::path folder = folder_ / "conformance";
-  EXPECT_TRUE(load_conformance(folder).empty());
-  fs::create_directories(folder);
-  const json agrees = {{"closure", "diffuse"},
-                       {"evaluation_l1", 1e-7},
-                       {"sampling_share", 0.0},
-                       {"verdict", "ok"},
-                       {"sampling_resolution", 4e-3}};
-  const json wrong = {{"closure", "wrong"},
-                      {"sampling_share", 0.43},
-                      {"verdict", "fault"},
-                      {"sampling_resolution", 0.01},
-                      {"fault", "differs <much>"}};
-  std::ofstream(folder / "4.5.json") << json{{"blender", "4.5.15"}, {"closures", {agrees, wrong}}};
-  std::string page;
-  put_conformance(page, load_conformance(folder));
-  EXPECT_THAT(page, HasSubstr("4.5.15"));
-  EXPECT_THAT(page, HasSubstr("agrees (0.4 %)"));
-  EXPECT_THAT(page, HasSubstr("class=\"bad\" title=\"differs &lt;much&gt;\">+43.0 % (1.0 %)"));
-
-  json unknown = agrees;
-  unknown["verdict"] = "fine";
-  std::ofstream(folder / "5.0.json") << json{{"blender", "5.0.1"}, {"closures", json::array({unknown})}};
-  try {
-    load_conformance(folder);
-    FAIL() << "an unknown verdict was accepted";
-  } catch (const InputError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("5.0.json: closures[0].verdict"));
-  }
+TEST(Statistics, MedianOfAnEvenCountIsBetweenTheMiddleTwo) {
+  EXPECT_EQ(median({3, 1, 2}), 2);
+  EXPECT_EQ(median({4, 1, 2, 8}), 3);
 }
 
 TEST_F(ReportTest, PreviewsShowThePicturesAndTheSignOfTheDifference) {

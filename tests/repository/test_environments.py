@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 LIB = Path(__file__).parents[2] / "script" / "lib.sh"
+REQUIREMENTS = LIB.parent / "requirements"
 
 
 def bash(code, *args):
@@ -36,3 +37,11 @@ def test_environments_are_made_where_they_are_and_not_under_a_link(tmp_path):
     command = 'source "$0"; printf %s "$ENVS"'
     printed = subprocess.check_output(["bash", "-c", command, clone / "script" / "lib.sh"])
     assert printed.decode() == str(shared)
+
+
+def test_pages_are_tested_with_the_versions_that_make_them():
+    def pinned(name):
+        lines = (REQUIREMENTS / name).read_text(encoding="utf-8").splitlines()
+        return {line for line in lines if not line.startswith("#")}
+
+    assert pinned("page.txt") <= pinned("tools.txt")

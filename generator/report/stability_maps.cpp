@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "report/stability_page.h"
+#include "report/stability_maps.h"
 
 #include <fmt/format.h>
 
@@ -9,8 +9,10 @@
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <optional>
 
+#include "core/json_text.h"
 #include "core/parallel.h"
 #include "measure/probes.h"
 #include "model/model.h"
@@ -34,16 +36,22 @@ std::array<double, 3> color_of(double error) {
           std::clamp(0.45 - 0.35 * t, 0.1, 1.)};
 }
 
+std::array<int, 3> bytes(const std::array<double, 3>& color) {
+  std::array<int, 3> out{};
+  for (std::size_t i = 0; i < 3; ++i) out[i] = int(255 * color[i] + 0.5);
+  return out;
+}
+
 void write_map(const std::string& path, const Map& map) {
   std::vector<unsigned char> pixels(std::size_t(3 * kWidth * kHeight * kScale * kScale));
   for_all(kHeight, [&](std::size_t index) {
     const int row = int(index);
     for (int column = 0; column < kWidth; ++column) {
-      const auto c = color_of(map((column + 0.5) / kWidth, 1 - (row + 0.5) / kHeight));
+      const auto c = bytes(color_of(map((column + 0.5) / kWidth, 1 - (row + 0.5) / kHeight)));
       for (int i = 0; i < kScale * kScale; ++i) {
         const int x = column * kScale + i % kScale, y = row * kScale + i / kScale;
         for (std::size_t k = 0; k < 3; ++k)
-          pixels[std::size_t(3 * (y * kWidth * kScale + x)) + k] = static_cast<unsigned char>(255 * c[k] + 0.5);
+          pixels[std::size_t(3 * (y * kWidth * kScale + x)) + k] = static_cast<unsigned char>(c[k]);
       }
     }
   });
@@ -156,19 +164,19 @@ std::vector<Figure> printed_forms() {
     };
   };
   const char* cosine = "cos theta_i from 0 to 1, cos theta_r = 0.6";
-  const char* gloss = "n from 1e-3 to 1e8, by factors";
-  const char* offset = "angle from ideal reflection, 1e-12 to 1 rad, by factors; view at 30 degrees";
-  const char* exponent = "e from 1 to 1e8, by factors";
-  const char* grazing = "cos theta_o = 2 cos theta_i from 1e-12 to 1, by factors; azimuths 162 degrees apart";
-  const char* exponents = "n_u = n_v from 1 to 1e8, by factors";
+  const char* gloss = "n from 1e-3 to 1e8, logarithmic";
+  const char* offset = "angle from ideal reflection, 1e-12 to 1 rad, logarithmic; view at 30 degrees";
+  const char* exponent = "e from 1 to 1e8, logarithmic";
+  const char* grazing = "cos theta_o = 2 cos theta_i from 1e-12 to 1, logarithmic; azimuths 162 degrees apart";
+  const char* exponents = "n_u = n_v from 1 to 1e8, logarithmic";
   return {{"radziszewski_alda_printed", "Radziszewski-Alda, eq. 17 as printed", cosine, gloss, latitudinal(true)},
-          {"radziszewski_alda_ours", "Radziszewski-Alda, ours", cosine, gloss, latitudinal(false)},
+          {"radziszewski_alda_ours", "Radziszewski-Alda, as computed here", cosine, gloss, latitudinal(false)},
           {"ashikhmin_shirley_printed", "Ashikhmin-Shirley, eq. 16 as printed", offset, exponents, specular(true)},
-          {"ashikhmin_shirley_ours", "Ashikhmin-Shirley, ours", offset, exponents, specular(false)},
+          {"ashikhmin_shirley_ours", "Ashikhmin-Shirley, as computed here", offset, exponents, specular(false)},
           {"phong_printed", "Phong, as printed", offset, exponent, highlight(true)},
-          {"phong_ours", "Phong, ours", offset, exponent, highlight(false)},
+          {"phong_ours", "Phong, as computed here", offset, exponent, highlight(false)},
           {"oren_nayar_printed", "Oren-Nayar, section 4.3 as printed", grazing, "sigma from 0 to 0.66", rough(true)},
-          {"oren_nayar_ours", "Oren-Nayar, ours", grazing, "sigma from 0 to 0.66", rough(false)}};
+          {"oren_nayar_ours", "Oren-Nayar, as computed here", grazing, "sigma from 0 to 0.66", rough(false)}};
 }
 
 /// The largest error over some light directions, for every view and every value of the model's first number.
@@ -204,49 +212,41 @@ Figure figure_of(const Model& model) {
     return worst;
   };
   const std::string range =
-      number ? fmt::format("{} from {:g} to {:g}{}", number->name, value(0), value(1), factors ? ", by factors" : "")
+      number ? fmt::format("{} from {:g} to {:g}{}", number->name, value(0), value(1), factors ? ", logarithmic" : "")
              : "no number";
-  return {info.name, info.label, "cos theta_o from 1e-6 to 1, by factors", range, map};
+  return {info.name, info.label, "cos theta_o from 1e-6 to 1, logarithmic", range, map};
 }
 
 }  // namespace
 
-void write_stability_page(const std::string& dir) {
+void write_stability_maps(const std::string& dir, std::span<const Model* const> chosen) {
   std::error_code error;
   std::filesystem::create_directories(dir, error);
   if (error) throw InputError(fmt::format("{}: expected a folder that can be written: {}", dir, error.message()));
-  std::string body;
-  const auto add = [&](const Figure& f) {
-    write_map(dir + "/" + f.file + ".png", f.map);
-    body += fmt::format(
-        "<figure><img src=\"{}.png\" alt=\"{}\"><figcaption><b>{}</b><br>&rarr; {}<br>&uarr; "
-        "{}</figcaption></figure>\n",
-        f.file, f.title, f.title, f.x, f.y);
+  nlohmann::ordered_json printed = nlohmann::ordered_json::array(), of_models = printed, colors = printed;
+  const auto add = [&](nlohmann::ordered_json& maps, const Figure& f) {
+    const std::string picture = f.file + ".png";
+    write_map(dir + "/" + picture, f.map);
+    maps.push_back({{"picture", picture}, {"title", f.title}, {"x", f.x}, {"y", f.y}});
   };
-  body += "<h2>As printed and as computed here</h2>\n";
-  for (const Figure& f : printed_forms()) add(f);
-  body +=
-      "<h2>Every model</h2>\n<p>The largest error over ideal reflection, directions anywhere and the model's own "
-      "samples. High gloss turns the rounding of the directions themselves into light green.</p>\n";
-  for (const auto& [name, model] : models())
-    if (model->has_scatter()) add(figure_of(*model));
-  std::string legend;
-  for (int e = -16; e <= 0; e += 2) {
-    const auto c = color_of(std::pow(10., e));
-    legend += fmt::format("<span style=\"background:rgb({:.0f},{:.0f},{:.0f})\">1e{}</span>", 255 * c[0], 255 * c[1],
-                          255 * c[2], e);
-  }
-  const std::string path = dir + "/index.html";
-  std::ofstream out(path);
-  out << "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Stability</title><style>"
-         "body{font:15px sans-serif;margin:2em;max-width:1100px}figure{display:inline-block;margin:0 1em 1em 0}"
-         "figcaption{max-width:480px}span{display:inline-block;padding:.3em .6em;color:#fff;text-shadow:0 0 3px #000}"
-         "</style><h1>Rounding errors</h1><p>Relative error of f in double precision against 113 bits, on the same "
-         "inputs. Red: not a number or infinite. Grey: no light (below 1e-290).</p><p>"
-      << legend << "</p>\n"
-      << body << "</html>\n";
-  out.close();
-  if (!out) throw InputError(fmt::format("{}: expected a place that can be written", path));
+  for (const Figure& f : printed_forms())
+    if (std::ranges::any_of(chosen, [&](const Model* m) { return f.file.starts_with(m->info().name + "_"); }))
+      add(printed, f);
+  for (const Model* model : chosen)
+    if (model->has_scatter()) add(of_models, figure_of(*model));
+  for (int e = -16; e <= 0; e += 2) colors.push_back({{"exponent", e}, {"rgb", bytes(color_of(std::pow(10., e)))}});
+  const nlohmann::ordered_json out{{"format", 1},
+                                   {"generator", "brdfc " BRDFC_VERSION},
+                                   {"width", kWidth * kScale},
+                                   {"height", kHeight * kScale},
+                                   {"colors", colors},
+                                   {"printed", printed},
+                                   {"models", of_models}};
+  const std::string path = dir + "/maps.json";
+  std::ofstream file(path);
+  file << json_text(out, 2) << "\n";
+  file.close();
+  if (!file) throw InputError(fmt::format("{}: expected a place that can be written", path));
 }
 
 }  // namespace brdfc::report
