@@ -198,8 +198,8 @@ def as_pairs(lobes):
         raise ValueError(
             say("Expected at most {most} lobes, got {count}", most=most, count=len(pairs))
         )
-    for model, _ in pairs:
-        if pack.model(model).entry.get("two_sided"):
+    for model, values in pairs:
+        if pack.model(model).lets_light_through(values):
             raise ValueError(
                 say("{model!r} lets light through: expected models that reflect", model=model)
             )

@@ -146,6 +146,12 @@ class Model:
 
         return any(found.whole for found in formulas(self.name).formulas.values())
 
+    def lets_light_through(self, values):
+        """Whether the model lets light through, with these values and defaults."""
+        defaults = {name: p["default"] for name, p in self.parameters.items()}
+        complete = defaults | self.fixed | values
+        return any(limits.items() <= complete.items() for limits in self.entry["through"])
+
     def is_closure(self, values):
         """Whether a closure of Cycles' equals the model at these values; None stands for one that
         is linked. Formula Nodes and the aimed form are then that closure."""

@@ -124,8 +124,7 @@ class MaterialReader {
     if (alone_) m.at(key).error("expected \"model\" in a file of materials alone");
     if (const auto v = m.find("representation")) material.representation = v->text();
     std::vector<std::string> names;
-    for (const auto& [name, model] : models())
-      if (!model->two_sided()) names.push_back(name);
+    for (const auto& [name, model] : models()) names.push_back(name);
     std::vector<measured::Lobe> lobes;
     const JsonView list = m.at(key);
     if (!list.json().is_array() || list.json().empty() || list.json().size() > kMostLobes)
@@ -141,7 +140,7 @@ class MaterialReader {
           lobe.values[name] = read_value(value, parameter_named(name, value, info));
         }
       lobe.values = complete(info, lobe.values);
-      if (lobe.model->make_double(lobe.values)->scatters_through())
+      if (lobe.model->has_transmit() || lobe.model->make_double(lobe.values)->scatters_through())
         each.error("lets light through: expected lobes that reflect");
       lobes.push_back(std::move(lobe));
     }

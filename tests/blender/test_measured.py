@@ -236,8 +236,11 @@ def test_blender_and_the_reference_have_one_sum(ball, in_blender, osl):
 
 LAYERS = {
     "layers": [
-        {"model": "microfacet", "parameters": {"f0": [0.04, 0.06, 0.1], "ax": 0.2, "ay": 0.2}},
-        {"model": "cook_torrance", "parameters": {"m": 0.3, "f0": [0.3, 0.2, 0.3]}},
+        {
+            "model": "microfacet",
+            "parameters": {"f0": [0.1, 0.2, 0.3], "ax": 0.3, "ay": 0.5, "distribution": "beckmann"},
+        },
+        {"model": "radziszewski_alda", "parameters": {"n": 8, "tint": [0.3, 0.2, 0.3]}},
         {"model": "lambert", "parameters": {"rho": [0.8, 0.3, 0.1]}},
     ]
 }
@@ -265,8 +268,10 @@ def test_a_coat_lies_over_any_nodes(extension, empty, native):
     names = set(material.node_tree.nodes.keys())
     with pytest.raises(ValueError, match="ax"):
         extension.api.add_coat(material, ax=5)
-    with pytest.raises(ValueError, match="lets light through"):
-        extension.api.add_coat(material, "glass")
+    refracting = {"radziszewski_alda": {"around": "refraction"}, "glass": {}, "rough_glass": {}}
+    for model, values in refracting.items():
+        with pytest.raises(ValueError, match="lets light through"):
+            extension.api.add_coat(material, model, **values)
     assert set(material.node_tree.nodes.keys()) == names
     coat = extension.api.add_coat(material, ax=0.2, ay=0.2)
     assert extension.model_nodes.get_value(coat, "f0") == pytest.approx((0.04,) * 3)

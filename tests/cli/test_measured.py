@@ -1118,7 +1118,9 @@ def test_what_is_wrong_in_a_sum_is_said(tmp_path):
     lobe_table(tmp_path)
     for bad, expected in (
         ({"sum": []}, "materials.m.sum: expected 1 to 12 lobes"),
-        ({"sum": [{"model": "glass"}]}, "materials.m.sum[0].model: expected one of"),
+        ({"sum": [{"model": "glas"}]}, "materials.m.sum[0].model: did you mean glass"),
+        ({"sum": [{"model": "glass"}]}, "materials.m.sum[0]: lets light through"),
+        ({"sum": [{"model": "rough_glass"}]}, "materials.m.sum[0]: lets light through"),
         ({"sum": [{"model": "ward", "parameters": {"e": 2}}]}, "ward has no such parameter"),
         ({"sum": [{"model": "ward", "parameters": {"ks": {"texture": "x.png"}}}]}, "a constant"),
         ({"sum": [{"model": "ward"}], "model": "ward"}, "materials.m.model"),
