@@ -86,7 +86,9 @@ def _lead_to(output, target):
 def surface_of(material):
     """The link to the surface of a material that Cycles shows. Raises ValueError without one."""
     tree = shader_trees.shading(material)
-    link = shader_trees.surface_link(tree) if tree is not None else None
+    if tree is None:
+        raise ValueError(shader_trees.NODES_OFF)
+    link = shader_trees.surface_link(tree)
     if link is None:
         raise ValueError(
             say("Nothing leads to the surface of material {material!r}", material=material.name)

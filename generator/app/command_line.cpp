@@ -93,7 +93,7 @@ int run_command_line(int argc, char** argv) {
       fmt::print(stderr, "brdfc: unknown command '{}': see brdfc --help\n", argv[1]);
       return 2;
     }
-    fmt::print(stderr, "brdfc: {}\n", e.what());
+    fmt::print(stderr, "brdfc: {}{}\n", e.what(), argc == 1 ? ": see brdfc --help" : "");
     return 2;
   } catch (const InputError& e) {
     fmt::print(stderr, "brdfc: {}\n", e.what());

@@ -16,6 +16,7 @@ OpenColorIO for instance. Data and formulas are printed from those of the refere
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -160,7 +161,9 @@ def substance(name: str) -> Substance:
     """One of them. ValueError, listing the names, if there is none."""
     known = substances()
     if name not in known:
-        raise ValueError(f"expected one of {', '.join(known)}, got {name!r}")
+        near = difflib.get_close_matches(str(name).lower(), known, 1)
+        meant = f"did you mean {near[0]}? " if near else ""
+        raise ValueError(f"{meant}expected one of {', '.join(known)}, got {name!r}")
     return known[name]
 
 

@@ -289,6 +289,10 @@ def test_nothing_to_coat(extension, empty):
     with pytest.raises(ValueError, match="Nothing leads to the surface of material 'Bare'"):
         extension.api.add_coat(material)
     assert len(bpy.data.node_groups) == groups and not material.node_tree.nodes
+    if bpy.app.version < (5, 0):
+        material.use_nodes = False
+        with pytest.raises(ValueError, match="Use Nodes is off"):
+            extension.api.add_coat(material)
 
 
 @pytest.mark.slow

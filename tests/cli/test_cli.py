@@ -192,6 +192,7 @@ def test_eval_says_what_is_wrong_with_its_input(stdin, words):
         (["eval", "ashikhmin_shirley", "part=all"], ["part", "both, specular, diffuse", "'all'"]),
         (["eval"], ["model"]),
         (["evil"], ["unknown command", "'evil'"]),
+        ([], ["A subcommand is required", "see brdfc --help"]),
         (["eval", "lambert", "--frob"], ["--frob"]),
         (["sample", "lambert", "--count", "0", "--wo", "0,0,1"], ["--count"]),
         (

@@ -341,6 +341,7 @@ UP = [0.0, 0.0, 1.0]
             TypeError,
             "ward: wi: .*timedelta64",
         ),
+        (lambda b: b.optics.substance("Gold"), ValueError, "did you mean gold.*got 'Gold'"),
         (lambda b: b.optics.substance("gold").xyz(0), ValueError, r"gold: cosine: .*\(0, 1\].*0"),
         (lambda b: b.optics.substance("gold").xyz([1, 1]), TypeError, "gold: cosine: .*an array"),
         (
