@@ -68,7 +68,10 @@ void add_albedo_command(Command app) {
       in.emplace(std::cin, "stdin", std::vector<std::string>{"cos_theta_o"});
     if (!in || in->empty()) {
       const int n = o->count > 0 ? o->count : 64;
-      for (int i = 0; i < n; ++i) write(i + 1 == n ? 1. : 0.01 + 0.99 * i / (n - 1));
+      for (int i = 0; i < n; ++i) {
+        write(i + 1 == n ? 1. : 0.01 + 0.99 * i / (n - 1));
+        out.show();
+      }
     } else {
       std::vector<double> row;
       while (in->next(row)) {

@@ -121,7 +121,9 @@ void CsvWriter::write() {
   text_.clear();
 }
 
-void CsvWriter::finish() {
+void CsvWriter::finish() { show(); }
+
+void CsvWriter::show() {
   write();
   if (std::fflush(stdout) != 0) input_error("stdout: expected to write the table, could not");
 }

@@ -42,7 +42,8 @@ Difference measure_difference(const reference::Rendering& picture, const referen
 /// pixel, and the mean of every tile of kTestTile x kTestTile pixels. A family of n tests rejects where p < 1 - (1 -
 /// kTestSignificance)^(1/n) (Sidak). A pixel is tested twice: with the noise estimated from its own spread, and with
 /// the mean noise of its tile. The larger p counts. Where light arrives once in a thousand samples, the spread of most
-/// pixels does not show that they are noisy.
+/// pixels does not show that they are noisy. A tile is tested twice, too: with the spread of its mean, which by chance
+/// is small in one tile of many if pictures are few, and with the noise of its pixels.
 struct WelchTest {
   int pixels = 0, tiles = 0;
   int rejected_pixels = 0, rejected_tiles = 0;
