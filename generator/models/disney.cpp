@@ -28,7 +28,7 @@
 // roughness 1 the albedo is 0.31 from above and 0.61 near the horizon. f is reciprocal.
 //
 // Numerical stability. F_ss needs no half vector: (o.h)^2 = (1 + wi.wo) / 2. Near the horizon 1 - k s loses digits; (1
-// - s) + (1 - k) s does not, where 1 - s is a polynomial in the cosine. D_coat is (1 - b^2) / (-2 pi log(b) (sin^2
+// - k) + k (1 - s) does not, where 1 - s is a polynomial in the cosine. D_coat is (1 - b^2) / (-2 pi log(b) (sin^2
 // theta_h + b^2 (n.h)^2)), from the half vector's components.
 //
 // Sampling chooses among Lambert's cosine, visible normals of ggx and normals of the coat, with shares after their
@@ -104,7 +104,7 @@ template <class T> struct Disney {
   /// F_ss, for the cosines of both directions and wi.wo.
   T flat(const T& ci, const T& co, const T& across) const {
     const T facing = roughness * ((T(1) + across) / T(2));  // 1 - k
-    const auto factor = [&](const T& c) { return one_minus_schlick_weight(c) + facing * schlick_weight(c); };
+    const auto factor = [&](const T& c) { return facing + (T(1) - facing) * one_minus_schlick_weight(c); };
     return T(1.25) * (factor(ci) * factor(co) * (T(1) / maximum(ci + co, tiny<T>()) - T(0.5)) + T(0.5));
   }
 
