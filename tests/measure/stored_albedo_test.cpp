@@ -105,8 +105,10 @@ TEST(StoredAlbedos, AreReadNumberForNumber) {
 TEST(StoredAlbedos, AreThoseOfEachChoice) {
   std::size_t combinations = 0;
   for (const Model* model : stored()) {
+    const std::vector<Choices> all = choice_combinations(model->info());
+    if (all.size() == 1) continue;
     const AlbedoTable table = albedo_table_of(*model);
-    for (const Choices& choices : choice_combinations(model->info())) {
+    for (const Choices& choices : all) {
       ++combinations;
       for (const bool wide : {false, true}) {
         ParamValues values = with_choices(model->info(), choices);
@@ -117,10 +119,12 @@ TEST(StoredAlbedos, AreThoseOfEachChoice) {
         }
         const auto brdf = bind_model(*model, values).brdf;
         for (const double c : {0.2, 0.9}) {
-          constexpr int kAzimuths = 8;
+          const int azimuths = model->info().properties.isotropic ? 1 : 4;
           double sum = 0;
-          for (int i = 0; i < kAzimuths; ++i)
-            sum += albedo(*brdf, c, 2 * kPi * (i + 0.5) / kAzimuths, "", {1e-4, 1000, 1 << 12}).total().g / kAzimuths;
+          for (int i = 0; i < azimuths; ++i) {
+            const double phi = 2 * kPi * (i + 0.5) / azimuths;
+            sum += albedo(*brdf, c, phi, "", {1e-3, 200, 1 << 8}).total().g / azimuths;
+          }
           EXPECT_NEAR(lookup(table, *model, values, c).g, sum, 0.025)
               << model->info().name << " " << format_values(model->info(), complete(model->info(), values)) << " at "
               << c;
@@ -128,7 +132,7 @@ TEST(StoredAlbedos, AreThoseOfEachChoice) {
       }
     }
   }
-  EXPECT_GT(combinations, 60u);
+  EXPECT_GT(combinations, 40u);
 }
 
 /// Tests one model, selected by BRDFC_CELL: script/test sets it to the commit, so that all are tested in the course of
