@@ -186,8 +186,11 @@ def test_what_is_linked_reaches_the_twin_too(extension, balls):
 
 
 def test_the_albedo_output_is_the_twins_too(extension, balls):
+    """Of a model without choices and with one width at most: others have the tables' albedo, see
+    test_the_albedo_output_without_osl_follows_choices_and_widths."""
+
     def shining(form):
-        material = extension.api.new_material("coupled", form)
+        material = extension.api.new_material("shirley_1991", form)
         tree, (node,) = material.node_tree, extension.model_nodes.group_nodes(material)
         emission = tree.nodes.new("ShaderNodeEmission")
         tree.links.new(node.outputs["Albedo"], emission.inputs["Color"])
