@@ -120,7 +120,7 @@ def _block(tables, channels, shape):
     block = []
     for key, count in channels.items():
         of_term = tables.get(key) or [np.zeros(shape)]
-        block += [np.array(of_term[i % len(of_term)]) for i in range(count)]
+        block += [np.array(_channel(of_term, i)) for i in range(count)]
     return block + [np.zeros(shape) for _ in range(-len(block) % 3)]
 
 
@@ -151,9 +151,15 @@ def _tables(terms, channels_of):
             key = tuple(sorted(term["colors"])), factors
             if key in found:
                 # Ideal reflection and scattered light of the same colour.
-                channels = [sum(pair) for pair in zip(found[key], channels, strict=True)]
+                count = max(len(channels), len(found[key]))
+                channels = [_channel(channels, i) + _channel(found[key], i) for i in range(count)]
             found[key] = channels
     return found
+
+
+def _channel(channels, index):
+    """Red, green or blue; a term without colours has one channel for all."""
+    return channels[index % len(channels)]
 
 
 def _weight(w, key, given):

@@ -75,8 +75,9 @@ def test_lean_materials_show_the_same_and_hold_less(extension, used, tmp_path):
     assert counts() == before, "a plan changes nothing"
     assert api.bake(plan) == 3
     # The file has no lamp, so no lean shader has a slot, and the group of lamps is removed. So are
-    # three twins, one with an image, the albedo of ward, and the text that tells where shaders run.
-    less = {"node_groups": 4, "texts": 1, "images": 2}
+    # three twins, one with an image, the albedos of ward and coupled, and the text that tells where
+    # shaders run.
+    less = {"node_groups": 4, "texts": 1, "images": 3}
     lean = before | {kind: before[kind] - count for kind, count in less.items()}
     assert counts() == lean, "groups and texts that nothing uses are left"
     assert extension.pack.root == extension.pack._INSTALLED
