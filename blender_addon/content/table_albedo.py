@@ -96,6 +96,8 @@ def wire(w, model, given, cos_theta):
     for tables in found:
         for key, of_term in tables.items():
             channels[key] = max(channels.get(key, 0), len(of_term))
+    if not channels:  # constants of a pack can make it black
+        return w.combine(0.0, 0.0, 0.0)
     blocks = [_block(tables, channels, (rows.count, _VIEWS)) for tables in found]
     every = [table for block in blocks for table in block]
     picture = Picture(w, every, cos_theta, f"{model.label} (albedo)")
@@ -185,7 +187,7 @@ class _Rows:
         axes = {a["name"]: a for g in model.entry["albedo"]["grids"] for a in g["axes"]}
         if not names:
             self.places, self.count, self.found = {}, 2, [(False, [0.0])]
-        elif model.name in _WIDTHS:
+        elif len(names) == 2:
             self._of_widths(w, _WIDTHS[model.name], axes[names[0]]["values"], given)
         else:
             axis = axes[names[0]]
