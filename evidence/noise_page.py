@@ -132,8 +132,9 @@ class Page:
             lines.append(line(name_of(case), *("" if c is None else number(c) for c in cells)))
         return [*lines, *percentile_rows(columns), ""]
 
-    def cost_weighted(self, form, case, place):
-        noise, cost = self.relative(form, case, place), self.cost(form, case, place)
+    def cost_weighted(self, form, case, place, default=None):
+        """`default`: the cost where none was measured with that number of lamps."""
+        noise, cost = self.relative(form, case, place), self.cost(form, case, place) or default
         return None if noise is None or cost is None else noise * cost
 
     def summary(self):
@@ -170,16 +171,14 @@ class Page:
         """How often each form has the least noise x cost at a place."""
         counts = collections.Counter()
         for case in dict.fromkeys(case for found in self.noise.values() for case in found):
-            times = {form: self.time_at_equal_noise(form, case, place) for form in self.forms}
-            known = {form: time for form, time in times.items() if time is not None}
+            known = {}
+            for form in self.forms:
+                default = self.defaults.get((case[0], form))
+                if (time := self.cost_weighted(form, case, place, default)) is not None:
+                    known[form] = time
             if len(known) > 1:
                 counts[min(known, key=known.get)] += 1
         return counts
-
-    def time_at_equal_noise(self, form, case, place):
-        noise = self.relative(form, case, place)
-        cost = self.cost(form, case, place) or self.defaults.get((case[0], form))
-        return None if noise is None or cost is None else noise * cost
 
     def nodes(self):
         lines = [

@@ -48,7 +48,6 @@ _WIDTHS = {"microfacet": _ALPHAS, "ward": _ALPHAS, "ashikhmin_shirley": _EXPONEN
 _APART = {"again"}
 _VIEWS, _ROWS, _WIDTH_ROWS = 65, 65, 17
 _AZIMUTHS = np.pi / 12 * np.array([1, 3, 5])
-_SCALES = {"linear": lambda x: x, "log": np.log, "log1p": np.log1p}
 _INVERSE = {"linear": lambda x: x, "log": np.exp, "log1p": np.expm1}
 
 
@@ -192,7 +191,7 @@ class _Rows:
         else:
             axis = axes[names[0]]
             ends = {"scale": axis["scale"], "low": axis["values"][0], "high": axis["values"][-1]}
-            span = (_SCALES[axis["scale"]](ends[end]) for end in ("low", "high"))
+            span = (energy.SCALES[axis["scale"]](ends[end]) for end in ("low", "high"))
             self.places = {names[0]: _INVERSE[axis["scale"]](np.linspace(*span, _ROWS))}
             self.count = _ROWS
             self.found = [(False, [place_on_axis(w, ends, given(names[0]))])]
@@ -270,6 +269,8 @@ def _rows(values, axes, places):
 
 def _weights(axis, places):
     """The matrix (places, knots) of linear interpolation on the axis's scale."""
-    scale = _SCALES[axis["scale"]]
-    knots = scale(np.array(axis["values"]))
-    return np.array([np.interp(scale(places), knots, one) for one in np.eye(len(knots))]).T
+    weights = np.zeros((len(places), len(axis["values"])))
+    for row, place in zip(weights, places, strict=True):
+        lower, share = energy.bracket(axis, place)
+        row[lower : lower + 2] = 1 - share, share
+    return weights

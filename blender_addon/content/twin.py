@@ -11,6 +11,7 @@ import math
 import bpy
 import numpy as np
 
+from ..packs import energy
 from .wiring import DISTRIBUTIONS, Wiring
 
 
@@ -38,7 +39,7 @@ class Picture:
         for i, rows in enumerate(tables):
             band, channel = divmod(i, 3)
             pixels[band * count : (band + 1) * count, :, channel] = rows
-            self.where.setdefault(id(rows), (band, channel))
+            self.where[id(rows)] = band, channel
         self.image = bpy.data.images.new(name, width, height, float_buffer=True, is_data=True)
         self.image.use_half_precision = False
         self.image.alpha_mode = "NONE"
@@ -95,8 +96,7 @@ def place_on_axis(w, axis, value):
         "log": lambda x: w.math("LOGARITHM", x, math.e),
         "log1p": lambda x: w.math("LOGARITHM", w.math("ADD", x, 1.0), math.e),
     }[axis["scale"]]
-    number = {"linear": float, "log": math.log, "log1p": math.log1p}[axis["scale"]]
-    low, high = number(axis["low"]), number(axis["high"])
+    low, high = (energy.SCALES[axis["scale"]](axis[end]) for end in ("low", "high"))
     inside = w.math("MINIMUM", w.math("MAXIMUM", value, axis["low"]), axis["high"])
     return w.math("MULTIPLY", w.math("SUBTRACT", scale(inside), low), 1 / (high - low))
 

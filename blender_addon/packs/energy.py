@@ -10,15 +10,16 @@ import math
 
 from . import pack
 
-_SCALES = {"linear": float, "log": math.log, "log1p": math.log1p}
+#: What a table's axis is linear in.
+SCALES = {"linear": float, "log": math.log, "log1p": math.log1p}
 
 
-def _bracket(axis, value):
+def bracket(axis, value):
     """Index of the lower knot and weight of the upper one; values beyond the ends are clamped."""
     knots = axis["values"]
     value = min(max(value, knots[0]), knots[-1])
     upper = min(max(bisect.bisect_right(knots, value), 1), len(knots) - 1)
-    scale = _SCALES[axis["scale"]]
+    scale = SCALES[axis["scale"]]
     low, high = scale(knots[upper - 1]), scale(knots[upper])
     return upper - 1, (scale(value) - low) / (high - low)
 
@@ -27,7 +28,7 @@ def _interpolate(grid, coordinates):
     """Multilinear interpolation in a row-major table, first axis slowest, channel innermost."""
     corners = [(0, 1.0)]
     for axis in grid["axes"]:
-        lower, weight = _bracket(axis, coordinates[axis["name"]])
+        lower, weight = bracket(axis, coordinates[axis["name"]])
         size = len(axis["values"])
         corners = [
             (index * size + lower + step, factor * w)

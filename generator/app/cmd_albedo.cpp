@@ -70,7 +70,7 @@ void add_albedo_command(Command app) {
       const int n = o->count > 0 ? o->count : 64;
       for (int i = 0; i < n; ++i) {
         write(i + 1 == n ? 1. : 0.01 + 0.99 * i / (n - 1));
-        out.show();
+        out.flush();
       }
     } else {
       std::vector<double> row;
@@ -81,7 +81,7 @@ void add_albedo_command(Command app) {
         write(row[0]);
       }
     }
-    out.finish();
+    out.flush();
   });
 }
 

@@ -42,7 +42,7 @@ void add_base_command(Command app) {
       out.row({angle, w.relative_l1, w.share, w.best_scale, w.white_drawn, w.white_rest, w.sky_drawn, w.sky_rest,
                w.largest});
     }
-    out.finish();
+    out.flush();
   });
 }
 

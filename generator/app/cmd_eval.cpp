@@ -37,7 +37,7 @@ void add_eval_command(Command app) {
       measure::require_value(pdf, "pdf", label, wi, wo);
       out.row({f.r, f.g, f.b, pdf});
     }
-    out.finish();
+    out.flush();
   });
 }
 

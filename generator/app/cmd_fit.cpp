@@ -33,7 +33,7 @@ void print_errors(const std::vector<fit::ViewError>& errors, const std::string& 
     if (!axis.empty()) row.insert(row.begin(), e.number);
     out.row(row);
   }
-  out.finish();
+  out.flush();
 }
 
 }  // namespace

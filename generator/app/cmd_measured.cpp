@@ -95,7 +95,7 @@ void print_pairs(const Brdf<double>& brdf) {
     const Rgb<double> f = brdf.eval(wi, wo);
     out.row({f.r, f.g, f.b, brdf.pdf(wi, wo)});
   }
-  out.finish();
+  out.flush();
 }
 
 }  // namespace

@@ -93,7 +93,7 @@ void add_sample_command(Command app) {
         write_sample(bound, in.where(), wo, {row[3], row[4], row[5]}, out);
       }
     }
-    out.finish();
+    out.flush();
   });
 }
 

@@ -19,7 +19,7 @@ void print_f_cos(const std::function<Rgb<double>(const Vec3<double>& wi, const V
     const Rgb<double> f = f_cos(wi, wo);
     out.row({f.r, f.g, f.b});
   }
-  out.finish();
+  out.flush();
 }
 
 }  // namespace brdfc::app

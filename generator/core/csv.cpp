@@ -121,9 +121,7 @@ void CsvWriter::write() {
   text_.clear();
 }
 
-void CsvWriter::finish() { show(); }
-
-void CsvWriter::show() {
+void CsvWriter::flush() {
   write();
   if (std::fflush(stdout) != 0) input_error("stdout: expected to write the table, could not");
 }

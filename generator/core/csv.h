@@ -59,10 +59,8 @@ class CsvWriter {
   explicit CsvWriter(const std::string& header) { text_ = header + "\n"; }
   /// Adds a row of numbers with 17 significant digits.
   void row(const std::vector<double>& values);
-  /// Writes the rows so far, for tables whose rows take long.
-  void show();
-  /// Writes the remaining output; to be called at the end.
-  void finish();
+  /// Writes the rows so far; to be called at the end, and after each row of a table whose rows take long.
+  void flush();
 
  private:
   void write();

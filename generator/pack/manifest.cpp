@@ -10,6 +10,7 @@
 
 #include "fit/roles.h"
 #include "measure/bound_model.h"
+#include "measure/probes.h"
 #include "model/choices.h"
 #include "trace/program.h"
 
@@ -114,6 +115,18 @@ Json optical_json(const Model& model, const ParamValues& values) {
   for (const ParamInfo& p : model.info().params)
     if (p.optical != Optical::None && values.count(p.name)) j[p.name] = name_of(p.optical);
   return j;
+}
+
+Json through_json(const Model& model) {
+  Json out = Json::array();
+  const auto passes = [&](const ParamValues& values) {
+    return measure::two_sided(model, *model.make_double(complete(model.info(), values)));
+  };
+  if (passes({})) return {Json::object()};
+  for (const ParamInfo& p : model.info().params)
+    for (const std::string& choice : p.choices)
+      if (passes({{p.name, choice}})) out.push_back({{p.name, choice}});
+  return out;
 }
 
 Json table_json(const measure::AlbedoTable& t, const std::string& file, const Model& model, const ParamValues& fixed) {

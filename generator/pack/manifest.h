@@ -27,6 +27,9 @@ Json values_json(const ParamValues&);
 /// ParamInfo::optical of those of these parameters that declare it, by name.
 Json optical_json(const Model&, const ParamValues&);
 Json error_json(const forms::FormError&);
+/// The values of a choice with which a model lets light through, each as an object with one entry; one empty object if
+/// that is so with all.
+Json through_json(const Model&);
 /// The description of an albedo table without the fixed parameters. `file` is the table's image in the pack.
 Json table_json(const measure::AlbedoTable&, const std::string& file, const Model&, const ParamValues& fixed);
 /// The number that a fit runs over, and its range; null without one.

@@ -17,7 +17,6 @@
 #include "measure/albedo_file.h"
 #include "measure/bound_model.h"
 #include "measure/fold.h"
-#include "measure/probes.h"
 #include "measure/stored_albedo.h"
 #include "pack/addon.h"
 #include "pack/manifest.h"
@@ -94,20 +93,6 @@ forms::Setting setting_of(const plan::PlannedModel& plan, const forms::Form& for
 }
 
 /// `whole_table` is the model's albedo table, if it has one.
-/// The values of a choice with which a model lets light through, each as an object with one entry; one empty object if
-/// that is so with all.
-Json through_json(const Model& model) {
-  Json out = Json::array();
-  const auto passes = [&](const ParamValues& values) {
-    return measure::two_sided(model, *model.make_double(complete(model.info(), values)));
-  };
-  if (passes({})) return {Json::object()};
-  for (const ParamInfo& p : model.info().params)
-    for (const std::string& choice : p.choices)
-      if (passes({{p.name, choice}})) out.push_back({{p.name, choice}});
-  return out;
-}
-
 BuiltModel build_model(const plan::PlannedModel& plan, const measure::AlbedoTable& whole_table,
                        const plan::Costs& costs, const fs::path& scratch) {
   const Model& model = *plan.model;

@@ -67,9 +67,7 @@ class MaterialReader {
         continue;
       }
       m.only({"model", "optical", "thickness", "parameters", "representation"});
-      std::vector<std::string> names;
-      for (const auto& [name, model] : models()) names.push_back(name);
-      material.model = &find_model(m.at("model").choice(names));
+      material.model = &read_model(m.at("model"));
       const ModelInfo& info = material.model->info();
       json& resolved = out[id] = {{"model", info.name}, {"parameters", json::object()}};
       if (const auto optical = m.find("optical")) {
@@ -117,21 +115,25 @@ class MaterialReader {
   }
 
  private:
+  static const Model& read_model(const JsonView& name) {
+    std::vector<std::string> names;
+    for (const auto& [each, model] : models()) names.push_back(each);
+    return find_model(name.choice(names));
+  }
+
   /// Models that are added up, or that lie above others, with constant parameters.
   void read_stack(const JsonView& m, measured::Stack stack, Material& material, json& resolved) {
     const char* key = key_of(stack);
     m.only({key, "representation"});
     if (alone_) m.at(key).error("expected \"model\" in a file of materials alone");
     if (const auto v = m.find("representation")) material.representation = v->text();
-    std::vector<std::string> names;
-    for (const auto& [name, model] : models()) names.push_back(name);
     std::vector<measured::Lobe> lobes;
     const JsonView list = m.at(key);
     if (!list.json().is_array() || list.json().empty() || list.json().size() > kMostLobes)
       list.fail(fmt::format("1 to {} lobes", kMostLobes));
     for (const JsonView& each : list.elements()) {
       each.only({"model", "parameters"});
-      measured::Lobe lobe{&find_model(each.at("model").choice(names)), {}};
+      measured::Lobe lobe{&read_model(each.at("model")), {}};
       const ModelInfo& info = lobe.model->info();
       if (const auto parameters = each.find("parameters"))
         for (const auto& [name, value] : parameters->members()) {

@@ -14,12 +14,11 @@ shaders and the reference renderer are made of.
 
 from __future__ import annotations
 
-import difflib
 import importlib
 
 from . import optics
 from ._measured import Fit, Measured, measured
-from ._model import Choice, Color, Model, Number, Parameter, Sample
+from ._model import Choice, Color, Model, Number, Parameter, Sample, meant
 from ._version import __version__
 from .models import NAMES
 
@@ -48,7 +47,6 @@ def models() -> tuple[str, ...]:
 def model(name: str) -> Model:
     """The model of that name, loaded when it is first asked for. ValueError if there is none."""
     if name not in NAMES:
-        near = difflib.get_close_matches(str(name), NAMES, 1)
-        meant = f"did you mean {near[0]}? " if near else ""
-        raise ValueError(f"unknown model {name!r}: {meant}expected one of {', '.join(NAMES)}")
+        near = meant(name, NAMES)
+        raise ValueError(f"unknown model {name!r}: {near}expected one of {', '.join(NAMES)}")
     return importlib.import_module(f".models.{name}", __name__).MODEL

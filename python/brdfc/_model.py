@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import difflib
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from numbers import Integral
 from types import ModuleType
@@ -65,6 +66,12 @@ class Choice:
 
 
 Parameter = Number | Color | Choice
+
+
+def meant(name: object, known: Iterable[str]) -> str:
+    """ "did you mean ward? ", with the nearest of the known names; "" if none is near."""
+    near = difflib.get_close_matches(str(name).lower(), known, 1)
+    return f"did you mean {near[0]}? " if near else ""
 
 
 def real(what: str, value: ArrayLike, expected: str) -> Array:

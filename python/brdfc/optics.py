@@ -16,7 +16,6 @@ OpenColorIO for instance. Data and formulas are printed from those of the refere
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,7 +27,7 @@ from numpy.typing import NDArray
 
 from . import _optics
 from ._formula import NUMPY
-from ._model import real
+from ._model import meant, real
 from ._optical_file import read_file
 
 #: Metres after which absorption is exact where none are stated, and their range.
@@ -161,9 +160,7 @@ def substance(name: str) -> Substance:
     """One of them. ValueError, listing the names, if there is none."""
     known = substances()
     if name not in known:
-        near = difflib.get_close_matches(str(name).lower(), known, 1)
-        meant = f"did you mean {near[0]}? " if near else ""
-        raise ValueError(f"{meant}expected one of {', '.join(known)}, got {name!r}")
+        raise ValueError(f"{meant(name, known)}expected one of {', '.join(known)}, got {name!r}")
     return known[name]
 
 

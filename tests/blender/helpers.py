@@ -218,6 +218,16 @@ def empty_tree(owner):
     return owner.node_tree
 
 
+def show_albedo(material, node):
+    """Leads the output Albedo of a model's node to the surface of its material, by an Emission
+    node."""
+    tree = material.node_tree
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    emission = tree.nodes.new("ShaderNodeEmission")
+    tree.links.new(node.outputs["Albedo"], emission.inputs["Color"])
+    tree.links.new(emission.outputs[0], output.inputs["Surface"])
+
+
 def node_material(kind, **inputs):
     """A material of one of Blender's own nodes."""
     material = bpy.data.materials.new(kind)

@@ -15,6 +15,7 @@ from helpers import (
     draw,
     evaluate,
     materials_of,
+    show_albedo,
     with_every_model,
 )
 from worlds import coloured, gradient, half, spot, white
@@ -525,13 +526,8 @@ def test_albedo_output_panel_and_model_agree(extension, empty, tool, model, valu
             continue
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
         scene, material = start(extension, model, form, values, max_bounces=0)
-        tree = material.node_tree
         extension.api.add_albedo(material)
-        node = extension.model_nodes.group_nodes(material)[0]
-        output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
-        emission = tree.nodes.new("ShaderNodeEmission")
-        tree.links.new(node.outputs["Albedo"], emission.inputs["Color"])
-        tree.links.new(emission.outputs[0], output.inputs["Surface"])
+        show_albedo(material, extension.model_nodes.group_nodes(material)[0])
         meter = Goniometer(scene, material, tilted(cosines, 0.7), samples=4)
         shader = meter.measure()
         assert np.abs(shader - expected).max() < 2e-5
@@ -564,12 +560,8 @@ def test_the_albedo_output_without_osl_follows_choices_and_widths(extension, emp
             bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
             scene, material = start(extension, model, "nodes", values, max_bounces=0)
             scene.cycles.shading_system = False
-            tree = material.node_tree
             (node,) = extension.model_nodes.group_nodes(material)
-            output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
-            emission = tree.nodes.new("ShaderNodeEmission")
-            tree.links.new(node.outputs["Albedo"], emission.inputs["Color"])
-            tree.links.new(emission.outputs[0], output.inputs["Surface"])
+            show_albedo(material, node)
             shown = Goniometer(scene, material, tilted(cosines, 0.7), samples=4).measure()
             expected = [extension.api.albedo(model, c, **values) for c in cosines]
             off = np.abs(shown - expected).max()

@@ -17,6 +17,7 @@ from helpers import (
     pairs_csv,
     read_csv,
     render,
+    show_albedo,
 )
 
 #: One with a single colour for all closures, and one with three channels and a mirror.
@@ -191,11 +192,8 @@ def test_the_albedo_output_is_the_twins_too(extension, balls):
 
     def shining(form):
         material = extension.api.new_material("shirley_1991", form)
-        tree, (node,) = material.node_tree, extension.model_nodes.group_nodes(material)
-        emission = tree.nodes.new("ShaderNodeEmission")
-        tree.links.new(node.outputs["Albedo"], emission.inputs["Color"])
-        output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
-        tree.links.new(emission.outputs[0], output.inputs["Surface"])
+        (node,) = extension.model_nodes.group_nodes(material)
+        show_albedo(material, node)
         return material
 
     shone = {osl: balls([shining("exact")], osl) for osl in (True, False)}
