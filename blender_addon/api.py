@@ -378,11 +378,12 @@ def set_substance(material, substance, node=None, thickness=None):
     `thickness` metres (0.01 by default). Where no k is given, nothing is absorbed. All other
     parameters keep their values.
 
-    `substance`: one of substances(), or a file NAME.csv or NAME.txt as refractiveindex.info exports
-    it, or NAME.yml of its database. Returns the parameters that were set, and prints the
-    assumptions made about a file. Raises ValueError for an unknown name, for a file that can't be
-    read (with the line and what was expected), for a model without such parameters, and for a
-    thickness where nothing is absorbed; in that case nothing is changed.
+    `substance`: one of substances(), or a file: a table NAME.csv or NAME.txt, as
+    refractiveindex.info exports it, NAME.yml of its database, or NAME.eta.spd, a spectrum as pbrt
+    has them. Returns the parameters that were set, and prints the assumptions made about a file.
+    Raises ValueError for an unknown name, for a file that can't be read (with the line and what was
+    expected), for a model without such parameters, and for a thickness where nothing is absorbed;
+    in that case nothing is changed.
     """
     from .packs import optical
 

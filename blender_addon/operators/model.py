@@ -243,8 +243,8 @@ def _substances(locale):
     rows = [(s.name, s.label, s.source) for s in (*metals, *others)]
     about = tip(
         say(
-            "Measurements of refractiveindex.info: a table of wl,n and "
-            "wl,k, or a YAML file of its database"
+            "n and k over the wavelength: a table with a header such as wl,n,k, a YAML file of "
+            "refractiveindex.info's database, or a spectrum NAME.eta.spd"
         )
     )
     return [*rows, (_FILE, iface(say("From File\u2026")), about)]
@@ -277,13 +277,13 @@ class BRDFC_OT_substance(ChangesActiveMaterial, Operator):
     filepath: StringProperty(
         name="File",
         description=(
-            "Measurements of refractiveindex.info: a table of wl,n and "
-            "wl,k, or a YAML file of its database"
+            "n and k over the wavelength: a table with a header such as wl,n,k, a YAML file of "
+            "refractiveindex.info's database, or a spectrum NAME.eta.spd"
         ),
         subtype="FILE_PATH",
         options={"SKIP_SAVE"},
     )
-    filter_glob: StringProperty(default="*.csv;*.txt;*.yml;*.yaml", options={"HIDDEN"})
+    filter_glob: StringProperty(default="*.csv;*.txt;*.yml;*.yaml;*.spd", options={"HIDDEN"})
 
     def invoke(self, context, event):
         if self.substance != _FILE:
@@ -297,7 +297,8 @@ class BRDFC_OT_substance(ChangesActiveMaterial, Operator):
         try:
             if self.substance == _FILE and not name.lower().endswith(optical.ENDINGS):
                 expected = say(
-                    "{file}: expected a file NAME.csv, NAME.txt or NAME.yml", file=repr(name)
+                    "{file}: expected a file NAME.csv, NAME.txt, NAME.yml or NAME.eta.spd",
+                    file=repr(name),
                 )
                 raise ValueError(expected)
             node = model_nodes.named(material, self.node) if self.node else None

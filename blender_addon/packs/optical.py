@@ -24,7 +24,7 @@ for _channel, _letter in enumerate("rgb"):
 #: The roles that describe absorption inside.
 _INSIDE = ("attenuation", "per_length")
 #: Names of files of n and k.
-ENDINGS = (".csv", ".txt", ".yml", ".yaml")
+ENDINGS = (".csv", ".txt", ".yml", ".yaml", ".spd")
 
 
 def can_have(model_name):
@@ -33,16 +33,16 @@ def can_have(model_name):
 
 
 def find(name):
-    """Finds a substance of the extension, or reads a file NAME.csv or NAME.txt as
-    refractiveindex.info exports it, or NAME.yml of its database.
+    """Finds a substance of the extension, or reads a file: a table NAME.csv or NAME.txt,
+    NAME.yml of refractiveindex.info's database, or a spectrum NAME.eta.spd.
 
     Raises ValueError that names file, line and what was expected."""
     from ..brdfc import optics  # NumPy's formulas are imported on first use
 
     if not isinstance(name, str | os.PathLike):
         raise ValueError(
-            "expected the name of a substance or a file NAME.csv, NAME.txt or NAME.yml, got "
-            f"{name!r}"
+            "expected the name of a substance or a file NAME.csv, NAME.txt, NAME.yml or "
+            f"NAME.eta.spd, got {name!r}"
         )
     name = os.path.expanduser(bpy.path.abspath(os.fspath(name)))
     if not name.lower().endswith(ENDINGS):

@@ -83,7 +83,8 @@ void add_optical_command(Command app) {
       "The working space is the role scene_linear of the configuration that OCIO names, otherwise Rec.709.");
   cmd.add_option(
       "name", o->name,
-      "Substance, or a file NAME.csv, NAME.txt or NAME.yml of refractiveindex.info; all substances if omitted");
+      "Substance, or a file: a table NAME.csv or NAME.txt, NAME.yml of refractiveindex.info's database, or a spectrum "
+      "NAME.eta.spd; all substances if omitted");
   add_number(cmd, "--thickness", o->thickness, {kThinnest, kThickest},
              "Distance in metres for which the absorption of a glass is exact; prints the error at others")
       .capture_default_str();

@@ -19,16 +19,17 @@ class Cleaner {
  public:
   Cleaner(std::string file, std::vector<std::string>& notes) : file_(std::move(file)), notes_(notes) {}
 
-  /// True if wavelengths are in nanometres.
-  bool in_nanometres(const std::vector<Row>& n, const std::vector<Row>& k) {
+  /// True if wavelengths whose unit nobody states are in nanometres.
+  bool in_nanometres(const std::vector<Row>& n, const std::vector<Row>& k, bool in_um) {
+    bool large = !in_um;
     for (const auto* rows : {&n, &k})
       for (const Row& r : *rows) {
         if (!(r.wavelength > 0))
           input_error("{} line {}: expected a wavelength above 0, got {:g}", file_, r.line, r.wavelength);
-        if (r.wavelength < kNanometres) return false;
+        large = large && r.wavelength >= kNanometres;
       }
-    note("wavelengths of 100 and more are taken for nanometres");
-    return true;
+    if (large) note("wavelengths of 100 and more are taken for nanometres");
+    return large;
   }
 
   Curve curve(std::vector<Row> rows, char letter, bool nanometres) {
@@ -144,7 +145,7 @@ Substance read_substance(const fs::path& path) {
   OpticalFile found = read_optical_file(path);
   Substance out{file, found.label.empty() ? path.stem().string() : found.label, found.source, {}, {}, {}};
   Cleaner cleaner(file, out.notes);
-  const bool nanometres = cleaner.in_nanometres(found.n, found.k);
+  const bool nanometres = cleaner.in_nanometres(found.n, found.k, found.in_um);
   out.n = cleaner.curve(std::move(found.n), 'n', nanometres);
   if (out.n.nm.empty()) input_error("{}: expected n in the visible, found none", file);
   out.k = cleaner.curve(std::move(found.k), 'k', nanometres);
@@ -172,7 +173,8 @@ Substance find_substance(const std::string& name, const fs::path& folder) {
     if (s.name == name) return s;
     known.push_back(s.name);
   }
-  input_error("expected a file NAME.csv, NAME.txt or NAME.yml, or one of {}, got '{}'", fmt::join(known, ", "), name);
+  input_error("expected a file NAME.csv, NAME.txt, NAME.yml or NAME.eta.spd, or one of {}, got '{}'",
+              fmt::join(known, ", "), name);
 }
 
 OpticalValues optical_values(const Substance& s, const ToRgb& to_rgb) {

@@ -41,8 +41,7 @@ inline constexpr double kNeededMin = 430, kNeededMax = 650;
 inline constexpr double kExpectedMin = 400, kExpectedMax = 700;
 /// Wavelengths in nm outside of which light is invisible; an invalid value there is ignored.
 inline constexpr double kSeenMin = 380, kSeenMax = 780;
-/// If any wavelength of a file is at least this number, whatever its unit, all are taken as nanometres: infrared of 100
-/// um has no effect on colour.
+/// If a file states no unit and all of its wavelengths are at least this number, they are taken as nanometres.
 inline constexpr double kNanometres = 100;
 /// Measured values of k between 0 and minus this are noise about 0.
 inline constexpr double kNoiseOfK = 1e-3;

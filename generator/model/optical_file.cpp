@@ -2,6 +2,7 @@
 #include "model/optical_file.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <map>
@@ -31,30 +32,79 @@ std::vector<double> numbers_of(const std::vector<std::string>& fields) {
 
 /// Adds a row of a table with these columns beside the wavelength.
 void add_row(OpticalFile& out, const std::string& columns, const std::vector<std::string>& fields,
-             const std::string& text, const std::string& where, int line) {
+             const std::string& text, const std::string& where, int line, double unit = 1) {
   const std::vector<double> row = numbers_of(fields);
   if (row.size() != fields.size() || row.size() != columns.size() + 1)
-    input_error("{}: expected {} numbers, a wavelength in \xc2\xb5m and {}, got '{}'", where, columns.size() + 1,
+    input_error("{}: expected {} numbers, a wavelength and {}, got '{}'", where, columns.size() + 1,
                 columns == "nk" ? "n and k" : columns, text);
   for (std::size_t i = 0; i < columns.size(); ++i)
-    (columns[i] == 'n' ? out.n : out.k).push_back({row[0], row[i + 1], line});
+    (columns[i] == 'n' ? out.n : out.k).push_back({row[0] * unit, row[i + 1], line});
 }
 
 void check_once(const OpticalFile& found, char letter, const std::string& where) {
   if (!(letter == 'n' ? found.n : found.k).empty()) input_error("{}: expected {} once", where, letter);
 }
 
-// ---- Exports ---------------------------------------------------------------------------------------------
+// ---- Tables with a header, such as exports ---------------------------------------------------------------
 
-/// A line of the two kinds that refractiveindex.info exports: fields are separated by commas or by tabs.
-std::string with_commas(std::string line) {
-  if (line.find(',') == std::string::npos) std::ranges::replace(line, '\t', ',');
+std::string lower(std::string text) {
+  std::ranges::transform(text, text.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  return text;
+}
+
+/// What a header says of its first column: nothing if these are not wavelengths; otherwise their unit in um, or 0 if
+/// the header does not state it. Such as "wl", "nm", "Wavelength (nm)", "lambda [um]", "wavelength_nm".
+std::optional<double> wavelength_unit(const std::string& field) {
+  static const std::map<std::string, double> units = {{"", 0},
+                                                      {"nm", 1e-3},
+                                                      {"nanometer", 1e-3},
+                                                      {"nanometers", 1e-3},
+                                                      {"nanometre", 1e-3},
+                                                      {"um", 1},
+                                                      {"\xc2\xb5m", 1},
+                                                      {"\xce\xbcm", 1},
+                                                      {"micron", 1},
+                                                      {"microns", 1},
+                                                      {"micrometer", 1},
+                                                      {"micrometers", 1},
+                                                      {"micrometre", 1},
+                                                      {"a", 1e-4},
+                                                      {"angstrom", 1e-4},
+                                                      {"angstroms", 1e-4},
+                                                      {"\xc3\x85", 1e-4},
+                                                      {"\xc3\xa5", 1e-4},
+                                                      {"\xe2\x84\xab", 1e-4}};
+  const std::string around = " _/()[]";
+  for (const std::string name : {"wavelengths", "wavelength", "wl", "lambda", "\xce\xbb", ""}) {
+    if (!field.starts_with(name)) continue;
+    const std::string rest = field.substr(name.size());
+    const auto first = rest.find_first_not_of(around);
+    const std::string unit =
+        first == std::string::npos ? "" : rest.substr(first, rest.find_last_not_of(around) + 1 - first);
+    if (name.empty() ? unit.size() > 1 : first != 0)
+      if (const auto at = units.find(unit); at != units.end()) return at->second;
+  }
+  return std::nullopt;
+}
+
+/// 'n' or 'k' for the name of its column, otherwise 0.
+char letter_of(const std::string& field) {
+  if (field == "n" || field == "index" || field == "refractive index" || field == "index of refraction") return 'n';
+  if (field == "k" || field == "kappa" || field == "extinction coefficient") return 'k';
+  return 0;
+}
+
+/// A line whose fields are separated by commas, by tabs or by semicolons.
+std::string with_commas(std::string line, char separator) {
+  if (line.find(',') == std::string::npos) std::ranges::replace(line, separator, ',');
   return line;
 }
 
-OpticalFile read_export(const std::vector<std::string>& lines, const std::string& file) {
+OpticalFile read_table(const std::vector<std::string>& lines, const std::string& file) {
   OpticalFile out;
-  std::string block;  // the columns beside wl
+  std::string block;  // the columns beside the wavelength
+  double unit = 0;
+  char separator = '\t';
   int number = 0, comments = 0;
   for (const std::string& text : lines) {
     const std::string line = trim(text), where = fmt::format("{} line {}", file, ++number);
@@ -65,23 +115,69 @@ OpticalFile read_export(const std::vector<std::string>& lines, const std::string
       if (comments == 2) out.source = trim(line.substr(1));
       continue;
     }
-    const std::vector<std::string> header = split_header(with_commas(line));
-    const bool is_header = header[0] == "wl";
-    if (is_header) {
+    const char here = line.find('\t') == std::string::npos && line.find(';') != std::string::npos ? ';' : '\t';
+    const std::vector<std::string> header = split_header(with_commas(line, here));
+    const auto stated = wavelength_unit(header[0]);
+    if (stated) {
       block.clear();
       for (std::size_t i = 1; i < header.size(); ++i) {
-        if (header[i] != "n" && header[i] != "k") break;
-        const char letter = header[i][0];
+        const char letter = letter_of(header[i]);
+        if (!letter) break;
         check_once(out, letter, where);
         if (block.find(letter) != std::string::npos) input_error("{}: expected {} once", where, letter);
         block.push_back(letter);
       }
       if (block.empty() || block.size() + 1 != header.size()) block.clear();
+      if (out.n.size() + out.k.size() && out.in_um != (*stated > 0))
+        input_error("{}: expected the unit of wavelengths in each header or in none, got '{}'", where, line);
+      unit = *stated, separator = here, out.in_um = unit > 0;
     }
     if (block.empty()) input_error("{}: expected the header wl,n or wl,k or wl,n,k, got '{}'", where, line);
-    if (!is_header) add_row(out, block, split_fields(with_commas(line)), line, where, number);
+    if (!stated)
+      add_row(out, block, split_fields(with_commas(line, separator)), line, where, number, unit > 0 ? unit : 1);
   }
   return out;
+}
+
+// ---- Spectra ---------------------------------------------------------------------------------------------
+
+/// Adds a spectrum: pairs of a wavelength in nm and a value, separated by spaces, in lines of any length.
+void add_spectrum(std::vector<OpticalRow>& rows, const std::filesystem::path& path) {
+  int number = 0;
+  std::optional<double> nm;
+  for (const std::string& line : read_lines(path)) {
+    ++number;
+    std::istringstream in(line.substr(0, line.find('#')));
+    for (std::string word; in >> word;) {
+      const auto value = parse(word);
+      if (!value || !std::isfinite(*value))
+        input_error("{} line {}: expected pairs of a wavelength in nm and a value, got '{}'", path.string(), number,
+                    word);
+      if (nm) rows.push_back({*nm / 1000, *value, number});
+      nm = nm ? std::nullopt : value;
+    }
+  }
+  if (nm) input_error("{}: expected pairs of a wavelength in nm and a value, got an odd count", path.string());
+}
+
+/// The spectra of n and of k, by the end of their names; only that of n must exist.
+OpticalFile read_spectra(const std::filesystem::path& path) {
+  const std::string stem = path.stem().string(), plain = lower(stem);
+  for (const std::string separator : {".", "-", "_"})
+    for (const std::string end : {"eta", "k"})
+      if (plain.ends_with(separator + end)) {
+        OpticalFile out;
+        out.label = stem.substr(0, stem.size() - end.size() - 1);
+        out.in_um = true;
+        const auto file_of = [&](const std::string& which) {
+          return path.parent_path() / (out.label + separator + which + path.extension().string());
+        };
+        add_spectrum(out.n, end == "eta" ? path : file_of("eta"));
+        const std::filesystem::path k = end == "k" ? path : file_of("k");
+        if (std::filesystem::exists(k)) add_spectrum(out.k, k);
+        return out;
+      }
+  input_error("{}: expected the name NAME.eta.spd, for the spectrum of n, with that of k in NAME.k.spd", path.string());
 }
 
 // ---- Files of the database -------------------------------------------------------------------------------
@@ -124,9 +220,34 @@ std::string without_tags(const std::string& text) {
   return out;
 }
 
-/// n by the formula of this number at a wavelength in um. Its coefficients are a constant and pairs.
+/// The fewest coefficients of each formula, and the most of 4, 7, 8 and 9, which are not sums of equal terms.
+constexpr std::array<std::size_t, 10> kFewest = {0, 1, 1, 1, 9, 1, 1, 3, 4, 6}, kMost = {0, 0, 0, 0, 17, 0, 0, 6, 4, 6};
+
+/// n by the formula of this number at a wavelength in um: those of refractiveindex.info's database, "Dispersion
+/// formulas". Sums have a constant and pairs of coefficients.
 double of_formula(int formula, const std::vector<double>& c, double um) {
   const double square = um * um;
+  if (formula == 4) {
+    double n2 = c[0];
+    for (std::size_t i = 1; i < 9; i += 4)
+      n2 += c[i] * std::pow(um, c[i + 1]) / (square - std::pow(c[i + 2], c[i + 3]));
+    for (std::size_t i = 9; i + 1 < c.size(); i += 2) n2 += c[i] * std::pow(um, c[i + 1]);
+    return std::sqrt(n2);
+  }
+  if (formula == 7) {  // Herzberger
+    const double l = 1 / (square - 0.028);
+    double n = c[0] + c[1] * l + c[2] * l * l, power = square;
+    for (std::size_t i = 3; i < c.size(); ++i, power *= square) n += c[i] * power;
+    return n;
+  }
+  if (formula == 8) {  // Clausius-Mossotti: a = (n^2 - 1) / (n^2 + 2)
+    const double a = c[0] + c[1] * square / (square - c[2]) + c[3] * square;
+    return std::sqrt((1 + 2 * a) / (1 - a));
+  }
+  if (formula == 9) {
+    const double apart = um - c[4];
+    return std::sqrt(c[0] + c[1] / (square - c[2]) + c[3] * apart / (apart * apart + c[5]));
+  }
   double sum = c[0];
   for (std::size_t i = 1; i + 1 < c.size(); i += 2) {
     if (formula == 1) sum += c[i] * square / (square - c[i + 1] * c[i + 1]);
@@ -142,8 +263,14 @@ void add_formula(OpticalFile& out, int formula, const Entry& entry, const std::s
   std::vector<std::string> ends = entry.all("wavelength_range");
   if (ends.empty()) ends = entry.all("range");
   const std::vector<double> c = numbers_of(words), range = numbers_of(ends);
-  if (c.size() != words.size() || c.size() % 2 == 0)
-    input_error("{}: expected coefficients of formula {}, a number and pairs of numbers", where, formula);
+  const std::size_t fewest = kFewest[std::size_t(formula)], most = kMost[std::size_t(formula)];
+  if (c.size() != words.size() || c.size() < fewest || (most && c.size() > most) ||
+      ((!most || formula == 4) && c.size() % 2 == 0))
+    input_error("{}: expected coefficients of formula {}, {}", where, formula,
+                !most            ? "a number and pairs of numbers"
+                : formula == 4   ? "9 numbers and up to 4 pairs of numbers"
+                : fewest == most ? fmt::format("{} numbers", most)
+                                 : fmt::format("{} to {} numbers", fewest, most));
   if (range.size() != 2 || ends.size() != 2 || !(range[0] < range[1]))
     input_error("{}: expected a wavelength_range of two numbers in \xc2\xb5m", where);
   if (1000 * range[0] > kNeededMin || 1000 * range[1] < kNeededMax)
@@ -301,22 +428,17 @@ OpticalFile read_database(const std::vector<std::string>& lines, const std::stri
         for (const Words& row : rows->second)
           add_row(out, type[1], row.words, row.text, fmt::format("{} line {}", file, row.line), row.line);
     } else if (type.size() == 2 && type[0] == "formula" && type[1].size() == 1 &&
-               std::string("12356").find(type[1]) != std::string::npos) {
+               std::string("123456789").find(type[1]) != std::string::npos) {
       check_once(out, 'n', where);
       add_formula(out, type[1][0] - '0', entry, where);
     } else {
       input_error(
-          "{}: expected tabulated n, k or nk, or formula 1, 2, 3, 5 or 6, got '{}'; the page of the substance on "
+          "{}: expected tabulated n, k or nk, or formula 1 to 9, got '{}'; the page of the substance on "
           "refractiveindex.info has its table under Data > CSV",
           where, entry.type);
     }
   }
   return out;
-}
-
-std::string lower(std::string text) {
-  std::ranges::transform(text, text.begin(), [](unsigned char c) { return char(std::tolower(c)); });
-  return text;
 }
 
 bool is_yaml(const std::string& name) {
@@ -328,17 +450,18 @@ bool is_yaml(const std::string& name) {
 
 bool is_optical_file(std::string name) {
   name = lower(name);
-  return name.ends_with(".csv") || name.ends_with(".txt") || is_yaml(name);
+  return name.ends_with(".csv") || name.ends_with(".txt") || name.ends_with(".spd") || is_yaml(name);
 }
 
 OpticalFile read_optical_file(const std::filesystem::path& path) {
   const std::string file = path.string();
+  if (lower(path.extension().string()) == ".spd") return read_spectra(path);
   const std::vector<std::string> lines = read_lines(path);
   const bool is_database =
       std::ranges::any_of(lines, [](const std::string& line) { return key_and_rest(line).first == "DATA"; });
   if (!is_database && is_yaml(file))
     input_error("{}: expected a file of refractiveindex.info's database (YAML), with a list DATA, found none", file);
-  OpticalFile out = is_database ? read_database(lines, file) : read_export(lines, file);
+  OpticalFile out = is_database ? read_database(lines, file) : read_table(lines, file);
   if (out.n.empty() && is_database) input_error("{}: expected n under DATA, found none", file);
   if (out.n.empty()) input_error("{}: expected a line wl,n and rows below it, found no n", file);
   return out;

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads files of a refractive index n + i k over the wavelength: exports of refractiveindex.info,
-and files of its database. generator/model/optical_file.cpp does the same, and says the same."""
+"""Reads files of a refractive index n + i k over the wavelength: exports of refractiveindex.info
+and other tables, files of its database, and spectra. generator/model/optical_file.cpp does the
+same, and says the same."""
 
 import math
 import re
@@ -32,16 +33,16 @@ def _number(text):
     return value if math.isfinite(value) else None
 
 
-def _add_row(found, columns, fields, text, where, line):
+def _add_row(found, columns, fields, text, where, line, unit=1.0):
     """Adds a row of a table with these columns beside the wavelength."""
     row = [_number(f) for f in fields]
     if None in row or len(row) != len(columns) + 1:
         raise ValueError(
-            f"{where}: expected {len(columns) + 1} numbers, a wavelength in µm and "
+            f"{where}: expected {len(columns) + 1} numbers, a wavelength and "
             f"{' and '.join(columns)}, got '{text}'"
         )
     for letter, value in zip(columns, row[1:], strict=True):
-        found[letter].append((row[0], value, line))
+        found[letter].append((row[0] * unit, value, line))
 
 
 def _check_once(found, letter, where):
@@ -49,22 +50,54 @@ def _check_once(found, letter, where):
         raise ValueError(f"{where}: expected {letter} once")
 
 
-# ---- exports -------------------------------------------------------------------------------------
+# ---- tables with a header, such as exports -------------------------------------------------------
+
+_NM = dict.fromkeys(("nm", "nanometer", "nanometers", "nanometre"), 1e-3)
+_UM = dict.fromkeys(
+    ("um", "µm", "\u03bcm", "micron", "microns", "micrometer", "micrometers", "micrometre"), 1.0
+)
+_ANGSTROMS = dict.fromkeys(("a", "angstrom", "angstroms", "\xc5", "\xe5", "\u212b"), 1e-4)
+#: Units of wavelengths, in micrometres.
+_UNITS = {"": 0.0, **_NM, **_UM, **_ANGSTROMS}
+_N = ("n", "index", "refractive index", "index of refraction")
+_K = ("k", "kappa", "extinction coefficient")
+_LETTERS = {**dict.fromkeys(_N, "n"), **dict.fromkeys(_K, "k")}
+_AROUND = " _/()[]"
+#: Lower-case letters for capitals of ASCII alone, as the tool has them.
+_LOWER = {ord(c): ord(c.lower()) for c in "ABCDEFGHIJKLMNOPQRSTUVWXYZ"}
+
+
+def _wavelength_unit(field):
+    """What a header says of its first column: None if these are not wavelengths; otherwise their
+    unit in micrometres, or 0 if the header does not state it."""
+    for name in ("wavelengths", "wavelength", "wl", "lambda", "λ", ""):
+        rest = field.removeprefix(name)
+        unit = rest.strip(_AROUND)
+        apart = not rest or rest[0] in _AROUND if name else len(unit.encode()) > 1
+        if field.startswith(name) and apart and unit in _UNITS:
+            return _UNITS[unit]
+    return None
 
 
 def _header(fields, found, where):
-    """The columns beside wl, none if that is no header."""
-    block = fields[1:]
-    if not block or any(f not in found for f in block):
-        return []
-    for at, letter in enumerate(block):
-        if found[letter] or letter in block[:at]:
+    """The columns beside the wavelength, none if that is no header."""
+    block = []
+    for field in fields:
+        letter = _LETTERS.get(field)
+        if letter is None:
+            return []
+        if found[letter] or letter in block:
             raise ValueError(f"{where}: expected {letter} once")
+        block.append(letter)
     return block
 
 
-def _read_export(lines, path):
-    comments, block = [], []
+def _fields(line, separator):
+    return [f.strip(' \t"') for f in line.split("," if "," in line else separator)]
+
+
+def _read_table(lines, path):
+    comments, block, unit, separator = [], [], 0.0, "\t"
     found = {"n": [], "k": []}
     for number, line in enumerate(lines, 1):
         line, where = line.strip(" \t"), f"{path} line {number}"
@@ -73,26 +106,102 @@ def _read_export(lines, path):
         if line.startswith("#"):
             comments.append(line[1:].strip(" \t"))
             continue
-        separator = "," if "," in line else "\t"
-        fields = [f.strip(' \t"') for f in line.split(separator)]
-        is_header = fields[0].lower() == "wl"
-        if is_header:
-            block = _header([f.lower() for f in fields], found, where)
+        here = ";" if ";" in line and "\t" not in line else "\t"
+        header = [f.translate(_LOWER) for f in _fields(line, here)]
+        stated = _wavelength_unit(header[0])
+        if stated is not None:
+            block = _header(header[1:], found, where)
+            if (found["n"] or found["k"]) and (unit > 0) != (stated > 0):
+                said = "the unit of wavelengths in each header or in none"
+                raise ValueError(f"{where}: expected {said}, got '{line}'")
+            unit, separator = stated, here
         if not block:
             raise ValueError(f"{where}: expected the header wl,n or wl,k or wl,n,k, got '{line}'")
-        if not is_header:
-            _add_row(found, block, fields, line, where, number)
+        if stated is None:
+            _add_row(found, block, _fields(line, separator), line, where, number, unit or 1.0)
     label, source = [*comments, "", ""][:2]
-    return label, source, found
+    return label, source, found, unit > 0
+
+
+# ---- spectra -------------------------------------------------------------------------------------
+
+
+def _spectrum(path):
+    """Pairs of a wavelength in nm and a value, separated by spaces, in lines of any length."""
+    expected = "expected pairs of a wavelength in nm and a value"
+    numbers = []
+    for number, line in enumerate(_plain_text(path).split("\n"), 1):
+        for word in line.split("#")[0].split():
+            value = _number(word)
+            if value is None:
+                raise ValueError(f"{path} line {number}: {expected}, got '{word}'")
+            numbers.append((value, number))
+    if len(numbers) % 2:
+        raise ValueError(f"{path}: {expected}, got an odd count")
+    pairs = zip(numbers[::2], numbers[1::2], strict=True)
+    return [(nm / 1000, value, line) for (nm, _), (value, line) in pairs]
+
+
+def _read_spectra(path):
+    """The spectra of n and of k, by the end of their names; only that of n must exist."""
+    match = re.fullmatch(r"(.*)([.\-_])(eta|k)", path.stem, re.IGNORECASE)
+    if match is None:
+        said = "expected the name NAME.eta.spd, for the spectrum of n, with that of k in NAME.k.spd"
+        raise ValueError(f"{path}: {said}")
+    label, separator, which = match.groups()
+    n, k = (
+        path if which.lower() == end else path.with_name(f"{label}{separator}{end}{path.suffix}")
+        for end in ("eta", "k")
+    )
+    found = {"n": _spectrum(n), "k": _spectrum(k) if k.exists() else []}
+    return label, "", found, True
 
 
 # ---- files of the database -----------------------------------------------------------------------
 
 
+#: The fewest coefficients of each formula, and the most of those that are not sums of equal terms.
+_FEWEST = {4: 9, 7: 3, 8: 4, 9: 6}
+_MOST = {4: 17, 7: 6, 8: 4, 9: 6}
+
+
+def _count_of_coefficients(formula, count):
+    """What is expected of their count; empty if it is so."""
+    fewest, most = _FEWEST.get(formula, 1), _MOST.get(formula)
+    paired = most is None or formula == 4
+    if fewest <= count <= (most or count) and not (paired and count % 2 == 0):
+        return ""
+    if most is None:
+        return "a number and pairs of numbers"
+    if formula == 4:
+        return "9 numbers and up to 4 pairs of numbers"
+    return f"{most} numbers" if fewest == most else f"{fewest} to {most} numbers"
+
+
+def _root(square):
+    return math.sqrt(square) if square >= 0 else math.nan
+
+
 def _of_formula(formula, c, um):
-    """n by the formula of this number at a wavelength. The coefficients are a constant and
-    pairs."""
-    square, sum_ = um * um, c[0]
+    """n by the formula of this number at a wavelength: those of refractiveindex.info's database,
+    "Dispersion formulas". Sums have a constant and pairs of coefficients."""
+    square = um * um
+    if formula == 4:
+        n2 = c[0]
+        for i in (1, 5):
+            n2 += c[i] * um ** c[i + 1] / (square - c[i + 2] ** c[i + 3])
+        return _root(n2 + sum(a * um**b for a, b in zip(c[9::2], c[10::2], strict=True)))
+    if formula == 7:  # Herzberger
+        part = 1 / (square - 0.028)
+        n = c[0] + c[1] * part + c[2] * part * part
+        return n + sum(a * square ** (i + 1) for i, a in enumerate(c[3:]))
+    if formula == 8:  # Clausius-Mossotti: a = (n^2 - 1) / (n^2 + 2)
+        a = c[0] + c[1] * square / (square - c[2]) + c[3] * square
+        return _root((1 + 2 * a) / (1 - a))
+    if formula == 9:
+        apart = um - c[4]
+        return _root(c[0] + c[1] / (square - c[2]) + c[3] * apart / (apart * apart + c[5]))
+    sum_ = c[0]
     for a, b in zip(c[1::2], c[2::2], strict=True):
         if formula == 1:
             sum_ += a * square / (square - b * b)
@@ -106,8 +215,7 @@ def _of_formula(formula, c, um):
         return sum_
     if formula == 6:
         return 1 + sum_
-    squared = sum_ if formula == 3 else 1 + sum_
-    return math.sqrt(squared) if squared >= 0 else math.nan
+    return _root(sum_ if formula == 3 else 1 + sum_)
 
 
 def _add_formula(found, formula, entry, where):
@@ -115,10 +223,9 @@ def _add_formula(found, formula, entry, where):
     ends = entry.get("wavelength_range") or entry.get("range", ())
     ends = [w for words, _, _ in ends for w in words]
     c, span = [_number(w) for w in words], [_number(w) for w in ends]
-    if None in c or len(c) % 2 == 0:
-        raise ValueError(
-            f"{where}: expected coefficients of formula {formula}, a number and pairs of numbers"
-        )
+    expected = _count_of_coefficients(formula, 0 if None in c else len(c))
+    if expected:
+        raise ValueError(f"{where}: expected coefficients of formula {formula}, {expected}")
     if None in span or len(span) != 2 or not span[0] < span[1]:
         raise ValueError(f"{where}: expected a wavelength_range of two numbers in µm")
     first, last = (end / 1000 for end in _optics.NEEDED)
@@ -255,16 +362,16 @@ def _read_database(lines, path):
                 _check_once(found, letter, where)
             for words, text, line in entry.get("data", ()):
                 _add_row(found, which, words, text, f"{path} line {line}", line)
-        elif kind == "formula" and which in ("1", "2", "3", "5", "6"):
+        elif kind == "formula" and which in tuple("123456789"):
             _check_once(found, "n", where)
             _add_formula(found, int(which), entry, where)
         else:
             raise ValueError(
-                f"{where}: expected tabulated n, k or nk, or formula 1, 2, 3, 5 or 6, got "
+                f"{where}: expected tabulated n, k or nk, or formula 1 to 9, got "
                 f"'{entry['type']}'; the page of the substance on refractiveindex.info has its "
                 "table under Data > CSV"
             )
-    return "", database.source, found
+    return "", database.source, found, False
 
 
 def _is_database(lines, path):
@@ -280,13 +387,16 @@ def _is_database(lines, path):
 
 
 def read_file(path):
-    """(label, source, {"n": rows, "k": rows}) of a file; a row is (wavelength, value, line). Raises
-    OSError, and ValueError naming file, line and what was expected."""
+    """(label, source, {"n": rows, "k": rows}, whether wavelengths are known to be in µm) of a file;
+    a row is (wavelength, value, line). Raises OSError, and ValueError naming file, line and what
+    was expected."""
+    if path.suffix.lower() == ".spd":
+        return _read_spectra(path)
     lines = _plain_text(path).split("\n")
     is_database = _is_database(lines, path)
-    label, source, found = (_read_database if is_database else _read_export)(lines, path)
+    label, source, found, in_um = (_read_database if is_database else _read_table)(lines, path)
     if not found["n"] and is_database:
         raise ValueError(f"{path}: expected n under DATA, found none")
     if not found["n"]:
         raise ValueError(f"{path}: expected a line wl,n and rows below it, found no n")
-    return label, source, found
+    return label, source, found, in_um

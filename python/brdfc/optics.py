@@ -177,16 +177,17 @@ class _Cleaner:
     def note(self, text):
         self.notes.append(f"{self.path}: {text}")
 
-    def in_nanometres(self, rows):
-        """Whether wavelengths are nanometres."""
+    def in_nanometres(self, rows, in_um):
+        """Whether wavelengths whose unit nobody states are nanometres."""
+        large = not in_um
         for wavelength, _, line in rows:
             if not wavelength > 0:
                 got = f"got {wavelength:g}"
                 raise ValueError(f"{self.path} line {line}: expected a wavelength above 0, {got}")
-            if wavelength < _optics.NANOMETRES:
-                return False
-        self.note("wavelengths of 100 and more are taken for nanometres")
-        return True
+            large = large and wavelength >= _optics.NANOMETRES
+        if large:
+            self.note("wavelengths of 100 and more are taken for nanometres")
+        return large
 
     def curve(self, rows, letter, nanometres):
         rows = [(w * (1 if nanometres else 1000), value, line) for w, value, line in rows]
@@ -247,20 +248,24 @@ class _Cleaner:
 
 
 def read(path: str | PathLike[str]) -> Substance:
-    """Reads a file as refractiveindex.info exports it: a line wl,n, rows of a wavelength in
-    micrometres and n, then the same of wl,k, which may be missing; or wl,n,k; with commas or tabs.
-    Lines that start with # are skipped; the first is the label, the second the source. Wavelengths
-    of 100 and more are nanometres; rows may come in any order, and of a wavelength that stands
-    twice the mean is taken. Or a file of that site's database (YAML) with tables, or with the
-    formulas 1, 2, 3, 5 and 6. Text is UTF-8, or UTF-16 with a byte-order mark. What was assumed is
-    said in `notes`.
+    """Reads a table as refractiveindex.info exports it: a line wl,n, rows of a wavelength in
+    micrometres and n, then the same of wl,k, which may be missing; or wl,n,k. Commas, tabs or
+    semicolons separate the fields, and a header may state the unit, as in "Wavelength (nm)";
+    where none does, wavelengths of 100 and more are nanometres. Lines that start with # are
+    skipped; the first is the label, the second the source. Rows may come in any order, and of a
+    wavelength that stands twice the mean is taken.
+
+    Reads also a file of that site's database (YAML), with tables or with any of its formulas; and
+    a spectrum of n, NAME.eta.spd, with that of k in NAME.k.spd beside it: pairs of a wavelength in
+    nanometres and a value, as pbrt and Mitsuba have them. Text is UTF-8, or UTF-16 with a
+    byte-order mark. What was assumed is said in `notes`.
 
     Raises OSError, and ValueError naming file, line and what was expected.
     """
     path = Path(path)
-    label, source, found = read_file(path)
+    label, source, found, in_um = read_file(path)
     cleaner = _Cleaner(path)
-    nanometres = cleaner.in_nanometres(found["n"] + found["k"])
+    nanometres = cleaner.in_nanometres(found["n"] + found["k"], in_um)
     curves = [cleaner.curve(rows, letter, nanometres) for letter, rows in found.items()]
     if not curves[0].nm:
         raise ValueError(f"{path}: expected n in the visible, found none")

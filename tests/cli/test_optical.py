@@ -12,6 +12,7 @@ import time
 import numpy as np
 import PyOpenColorIO as ocio
 import pytest
+from scipy.optimize import brentq
 from support import CONFIG, ROOT, SPACES, TOOL, run, scene
 
 #: X, Y, Z of the normal reflectance under D65 for the 1931 observer, relative to a perfect
@@ -195,8 +196,16 @@ def test_long_tables_of_yaml_are_read_in_linear_time(tmp_path, optics, style):
     assert time.process_time() - before < 5
 
 
+D2 = 0.58756**2
+LITHIUM_TRIBORATE = (2.4542 + 0.01125 / (D2 - 0.01135) - 0.01388 * D2) ** 0.5
+HERZBERGER = 1.5 + 0.004 / (D2 - 0.028) + 1e-4 / (D2 - 0.028) ** 2 - 1e-3 * D2 + 2e-3 * D2**2
+HERZBERGER -= 5e-4 * D2**3
+#: The n of which (n^2 - 1) / (n^2 + 2) is this number.
+CLAUSIUS_MOSSOTTI = 0.25 + 0.03 * D2 / (D2 - 0.02) - 1e-3 * D2
+CLAUSIUS_MOSSOTTI = brentq(lambda n: (n * n - 1) / (n * n + 2) - CLAUSIUS_MOSSOTTI, 1, 3)
 #: Published coefficients, and n at the line d (587.56 nm) from the same publications: fused silica
-#: (Malitson 1965), water at 20 C (Daimon and Masumura 2007), air (Ciddor 1996); and own ones.
+#: (Malitson 1965), water at 20 C (Daimon and Masumura 2007), lithium triborate (Chen and others
+#: 1989), air (Ciddor 1996), urea (Rosker and others 1985); and own ones.
 FORMULAS = {
     1: ("0 0.6961663 0.0684043 0.4079426 0.1162414 0.8974794 9.896161", 1.45846),
     2: (
@@ -206,7 +215,11 @@ FORMULAS = {
     ),
     3: ("2.25 0.01 -2 -0.01 2", (2.25 + 0.01 / 0.58756**2 - 0.01 * 0.58756**2) ** 0.5),
     5: ("1.5 0.004 -2", 1.5 + 0.004 / 0.58756**2),
+    4: ("2.4542 0.01125 0 0.01135 1 0 0 0 1 -0.01388 2", LITHIUM_TRIBORATE),
     6: ("0 0.05792105 238.0185 0.00167917 57.362", 1.000277),
+    7: ("1.5 0.004 0.0001 -0.001 0.002 -0.0005", HERZBERGER),
+    8: ("0.25 0.03 0.02 -0.001", CLAUSIUS_MOSSOTTI),
+    9: ("2.51527 0.0240 0.0300 0.0202 1.52 0.08771", 1.60366),
 }
 
 
@@ -378,6 +391,39 @@ def test_a_slab_of_the_stated_thickness_has_the_exact_colour(tmp_path):
     np.testing.assert_allclose(pixels.mean((0, 1)), expected, atol=3e-3)
 
 
+def test_spectra_as_pbrt_has_them(tmp_path, optics):
+    """Pairs in lines of any length, with comments. The end of a name says whether it is n or k."""
+    n, k = tmp_path / "Ag.eta.spd", tmp_path / "Ag.k.spd"
+    n.write_text("# silver, n\n298.76 1.519 400 0.173\n\n600 0.124 # red\n900 0.04\n")
+    k.write_text("298.76 1.08\n400 1.95\n600 3.73\n900 6.3\n")
+    table = tmp_path / "ag.csv"
+    table.write_text("nm,n,k\n298.76,1.519,1.08\n400,.173,1.95\n600,.124,3.73\n900,.04,6.3\n")
+    expected = optical(table)
+    for file in (n, k):
+        told, read = optical(file), optics.read(file)
+        assert told["label"] == read.label == "Ag"
+        for key in ("n", "k", "reflectance", "conductor"):
+            assert told[key] == expected[key]
+        assert read.index_d == pytest.approx(told["n_d"], rel=1e-12)
+    k.unlink()
+    assert not optical(n)["conductor"] and not optics.read(n).k.nm
+    alone = tmp_path / "glass_ETA.SPD"
+    alone.write_text("400 1.53 700 1.51")
+    assert optical(alone)["label"] == "glass" and optics.read(alone).notes == ()
+    for name, text, message in (
+        ("Au.k.spd", "400 1", "Au.eta.spd: cannot be read"),
+        ("Au.spd", "400 1", "Au.spd: expected the name NAME.eta.spd, for the spectrum of n"),
+        ("x.eta.spd", "400 1\n700", "x.eta.spd: expected pairs of a wavelength in nm and a value"),
+        ("y.eta.spd", "400 1\n700 n", "y.eta.spd line 2: expected pairs of a wavelength in nm"),
+    ):
+        file = tmp_path / name
+        file.write_text(text)
+        done = run("optical", file)
+        assert done.returncode == 2 and message in done.stderr
+        with pytest.raises((OSError, ValueError), match=re.escape(message.split(":")[0])):
+            optics.read(file)
+
+
 #: A file, and variants that must be read in the same way, with the resulting message.
 GOOD = "wl,n,k\n0.38,1.54,0.001\n0.6,1.5,0.0005\n1.2,1.4,0.002\n"
 ODD = {
@@ -387,6 +433,22 @@ ODD = {
     ),
     GOOD + "1.2,1.42,0.004\n1.4,1.4,0\n": ("1 wavelength of n stands twice", "1 wavelength of k"),
     GOOD.replace(",", "\t"): (),
+    GOOD.replace(",", ";"): (),
+    GOOD.replace("wl,n,k", "Wavelength (µm),n,k"): (),
+    GOOD.replace("wl,n,k", "lambda [um]\tN\tK").replace(",", "\t"): (),
+    GOOD.replace("wl,n,k", "Wavelength(nm),Refractive Index,Extinction Coefficient")
+    .replace("0.38", "380")
+    .replace("0.6,", "600,")
+    .replace("1.2,", "1200,"): (),
+    GOOD.replace("wl,n,k", "nm,n,k")
+    .replace("0.38", "380")
+    .replace("0.6,", "600,")
+    .replace("1.2,", "1200,")
+    + "90,1,0\n": (),
+    GOOD.replace("wl,n,k", "wavelength_angstrom,n,k")
+    .replace("0.38", "3800")
+    .replace("0.6,", "6000,")
+    .replace("1.2,", "12000,"): (),
     GOOD.replace("wl,n,k", '"wl","n","k"'): (),
     "wl,n,k\n" + "\n".join(reversed(GOOD.split("\n")[1:-1])): (),
     GOOD + "2,1.4,-1.6e-9\n": ("1 value of k is below 0, the least -1.6e-09: taken for 0",),
@@ -426,16 +488,19 @@ BAD = {
     "": ": expected a line wl,n and rows below it, found no n",
     "wl,k\n0.3,1\n0.8,1\n": ": expected a line wl,n and rows below it, found no n",
     "0.3,1\n": " line 1: expected the header wl,n or wl,k or wl,n,k, got '0.3,1'",
-    "nm,n\n380,1\n": " line 1: expected the header wl,n or wl,k or wl,n,k, got 'nm,n'",
+    "metre,n\n380,1\n": " line 1: expected the header wl,n or wl,k or wl,n,k, got 'metre,n'",
+    "wl (foot),n\n": " line 1: expected the header wl,n or wl,k or wl,n,k, got 'wl (foot),n'",
+    "nm,n\n300,1.5\n\nwl,k\n": " line 4: expected the unit of wavelengths in each header or in "
+    "none, got 'wl,k'",
     "wl,n,x\n": " line 1: expected the header wl,n or wl,k or wl,n,k, got 'wl,n,x'",
     "wl\n": " line 1: expected the header wl,n or wl,k or wl,n,k, got 'wl'",
     "wl,n,n\n": " line 1: expected n once",
     "wl,n\n0.3,1.5\n\nwl,n\n": " line 4: expected n once",
-    "wl,n\n\n0.3,one\n": " line 3: expected 2 numbers, a wavelength in µm and n, got '0.3,one'",
-    "wl,n\n0.3;1.5\n": " line 2: expected 2 numbers, a wavelength in µm and n, got '0.3;1.5'",
-    "wl,n\n0.3,1.5,2\n": " line 2: expected 2 numbers, a wavelength in µm and n, got '0.3,1.5,2'",
-    "wl,n\n0.3,nan\n": " line 2: expected 2 numbers, a wavelength in µm and n, got '0.3,nan'",
-    "wl,n,k\n0.3,1\n": " line 2: expected 3 numbers, a wavelength in µm and n and k, got '0.3,1'",
+    "wl,n\n\n0.3,one\n": " line 3: expected 2 numbers, a wavelength and n, got '0.3,one'",
+    "wl,n\n0.3;1.5\n": " line 2: expected 2 numbers, a wavelength and n, got '0.3;1.5'",
+    "wl,n\n0.3,1.5,2\n": " line 2: expected 2 numbers, a wavelength and n, got '0.3,1.5,2'",
+    "wl,n\n0.3,nan\n": " line 2: expected 2 numbers, a wavelength and n, got '0.3,nan'",
+    "wl,n,k\n0.3,1\n": " line 2: expected 3 numbers, a wavelength and n and k, got '0.3,1'",
     "wl,n\n0,1.5\n0.4,1.5\n": " line 2: expected a wavelength above 0, got 0",
     "wl,n\n0.4,0\n": " line 2: expected n in (0, 100], got 0",
     "wl,n\n0.3,1\n0.8,1\nwl,k\n0.4,-2\n": " line 5: expected k in [0, 100], got -2",
@@ -445,14 +510,20 @@ BAD = {
     "w\0l\0": ": expected text, in UTF-8, or in UTF-16 with a byte-order mark",
     "DATA:\n  type: tabulated n\n": " line 2: expected '- type: ...', got 'type: tabulated n'",
     "DATA:\n  - type: tabulated n2\n    data: |\n      0.3 1\n": " line 2: expected tabulated n, k "
-    "or nk, or formula 1, 2, 3, 5 or 6, got 'tabulated n2'; the page of the substance on "
+    "or nk, or formula 1 to 9, got 'tabulated n2'; the page of the substance on "
     "refractiveindex.info has its table under Data > CSV",
     "DATA:\n  - type: tabulated k\n    data: |\n      0.3 1\n      0.8 1\n": ": expected n under "
     "DATA, found none",
     "DATA:\n  - type: tabulated nk\n    data: |\n      0.3 1\n": " line 4: expected 3 numbers, a "
-    "wavelength in µm and n and k, got '0.3 1'",
+    "wavelength and n and k, got '0.3 1'",
     "DATA:\n  - type: formula 2\n    wavelength_range: 0.3 1\n    coefficients: 0 1\n": " line 2: "
     "expected coefficients of formula 2, a number and pairs of numbers",
+    "DATA:\n- type: formula 4\n  wavelength_range: 0.3 1\n  coefficients: 2 1 0.1\n": " line 2: "
+    "expected coefficients of formula 4, 9 numbers and up to 4 pairs of numbers",
+    "DATA:\n  - type: formula 7\n    wavelength_range: 0.3 1\n    coefficients: 2 1\n": " line 2: "
+    "expected coefficients of formula 7, 3 to 6 numbers",
+    "DATA:\n  - type: formula 9\n    wavelength_range: 0.3 1\n    coefficients: 2 1\n": " line 2: "
+    "expected coefficients of formula 9, 6 numbers",
     "DATA:\n  - type: formula 2\n    coefficients: 0 1 0.1\n": " line 2: expected a "
     "wavelength_range of two numbers in µm",
     # The range of a formula, as it stands in the file.
@@ -498,7 +569,10 @@ def test_what_is_wrong_in_a_file_is_said(tmp_path, optics, text):
 
 def test_names_that_there_are_not_are_errors(tmp_path, optics):
     for name, expected in (
-        ("unobtainium", "expected a file NAME.csv, NAME.txt or NAME.yml, or one of aluminium"),
+        (
+            "unobtainium",
+            "expected a file NAME.csv, NAME.txt, NAME.yml or NAME.eta.spd, or one of aluminium",
+        ),
     ):
         done = run("optical", name)
         assert done.returncode == 2 and expected in done.stderr and name in done.stderr
@@ -538,7 +612,8 @@ def test_a_scene_names_a_substance_or_a_file(tmp_path):
     for change, expected in (
         (
             {"optical": "mithril"},
-            "materials.a.optical: expected a file NAME.csv, NAME.txt or NAME.yml, or one of",
+            "materials.a.optical: expected a file NAME.csv, NAME.txt, NAME.yml or NAME.eta.spd, or "
+            "one of",
         ),
         ({"optical": "none.csv"}, "materials.a.optical: "),
         ({"parameters": {"n_r": 1}}, 'n_r: "optical" says what it is'),
