@@ -11,7 +11,8 @@ from ..packs import pack
 from ..trees import animation
 from .instances import Instances
 from .node_values import KINDS
-from .replacement import BEFORE, CORRECTED, HELPS, INPUT, MOVED, PreparedPart, Replacement
+from .planned_node import HELPS
+from .replacement import BEFORE, CORRECTED, INPUT, MOVED, PreparedPart, Replacement
 
 
 def apply(plans):

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ..common.i18n import Sentence, say
-from ..nearest import native_bsdf, specular
+from ..nearest import layer, native_bsdf, specular
 from ..nearest.native_bsdf import Native
 from ..trees import animation, shader_trees, shader_values, value_bounds
 
@@ -81,12 +81,23 @@ _OFTEN_ONE_COLOR = {"Alpha", "Base Color", "Color", "Emission Color", "Metallic"
 _WITHOUT_EFFECT = ("Weight", "Subsurface ", "Coat ", "Sheen ", "Thin Film ")
 
 
-def effective_sockets(node):
-    """The sockets of a convertible node that do something, or would if they had another value."""
+#: Sockets of the coat of a Principled node that a conversion keeps.
+COAT_SOCKETS = ("Coat Weight", "Coat Roughness", "Coat Normal")
+
+
+def effective_sockets(node, coated):
+    """The sockets of a convertible node that do something, or would if they had another value.
+    `coated`: whether it has a coat."""
     return [
         socket
         for socket in node.inputs
-        if socket.enabled and (socket.name in _OFF or not socket.name.startswith(_WITHOUT_EFFECT))
+        if socket.enabled
+        and (
+            socket.name in _OFF
+            or coated
+            and socket.name in COAT_SOCKETS
+            or not socket.name.startswith(_WITHOUT_EFFECT)
+        )
     ]
 
 
@@ -269,7 +280,7 @@ def given_of(node, inputs):
         given["beckmann"] = distribution == "BECKMANN"
         given["multiscatter"] = distribution == "MULTI_GGX"
     if kind == "principled":
-        check_off(inputs)
+        check_off(inputs, but={"Coat Weight"})
         metallic = 0.5 if (known := inputs.mean("Metallic")) is None else known
         given["metallic"] = min(max(metallic, 0.0), 1.0)
         if is_plastic(inputs):
@@ -413,6 +424,21 @@ def _stretches(inputs, kind):
         return tuple(_stretch_of(a) for a in found)
     found = tuple(min(max(a, -_MOST_GLOSSY), _MOST_GLOSSY) for a in found)
     return tuple((1 - a) ** 2 if a > 0 else 1 / (1 + a) ** 2 for a in found)
+
+
+def below_coat(inputs):
+    """The light that the coat of a Principled node leaves to what lies below, where it covers all:
+    as layer.below_coat(); empty without a coat."""
+    if "Coat Weight" not in inputs or inputs.constant("Coat Weight") == 0:
+        return ()
+    inputs.follows("Coat Weight")
+    # No node gives a shader a colour.
+    if inputs.value("Coat Tint", (1.0, 1.0, 1.0)) != (1, 1, 1):
+        raise Refused(say("it has {what}", what=Sentence("Coat Tint")))
+    ior = max(inputs.value("Coat IOR"), 1.0)
+    roughnesses = _roughnesses(inputs, "Coat Roughness")
+    f0 = ((ior - 1) / (ior + 1)) ** 2
+    return layer.below_coat(f0, roughnesses[0] if len(roughnesses) == 1 else None)
 
 
 def glows(inputs):

@@ -12,9 +12,11 @@ from ..common.i18n import Sentence, in_percent, say
 from ..nearest import specular
 from ..packs import pack
 from ..trees import shader_values
-from .node_values import ANISOTROPY, KINDS
+from .node_values import ANISOTROPY, COAT_SOCKETS, KINDS
 from .seen_node import SeenNode
 
+#: Custom property of the nodes that were added along with it: the name of the group node.
+HELPS = "brdfc_helps"
 #: A row of a plan names this many other materials at most.
 _MOST_NAMES = 6
 #: A plan with a larger error is refused, unless another limit is given.
@@ -79,6 +81,9 @@ class Plan(Part):
     #: Alpha.
     glows: bool = False
     transparent: bool = False
+    #: The light that the node's coat leaves to what lies below, where it covers all: as
+    #: layer.below_coat(). Empty without a coat.
+    below_coat: tuple = ()
     #: Whether the models need the node's tangent: that of its link or Cycles' default one, turned.
     anisotropic: bool = False
     #: Whether Filter Glossy blurs the node so that it shows, but not its model.
@@ -148,6 +153,7 @@ class Plan(Part):
         found |= {part.root[1] for part in parts if part.root}
         found |= {"Metallic"} if self.metal else set()
         found |= {"Alpha"} if self.transparent else set()
+        found |= set(COAT_SOCKETS) if self.below_coat else set()
         return found | ({"Emission Color", "Emission Strength"} if self.glows else set())
 
     @property

@@ -35,6 +35,7 @@ from .node_values import (
     STAYING,
     Inputs,
     Refused,
+    below_coat,
     both_linked,
     check_off,
     color_of,
@@ -44,7 +45,7 @@ from .node_values import (
     is_transparent,
     varying_of,
 )
-from .planned_node import Part, Plan
+from .planned_node import HELPS, Part, Plan
 from .seen_node import SeenNode
 
 #: Errors of nodes that reflect less, such as a black Glossy node, say nothing.
@@ -78,7 +79,7 @@ def _plan_clear(material, node, inputs):
     """The Plan for a Principled node that is smooth glass."""
     inputs.setting("mute")
     inputs.check_unknown(KNOWN_SOCKETS["principled"])
-    check_off(inputs, but={"Transmission Weight"})
+    check_off(inputs, but={"Transmission Weight", "Coat Weight"})
     if inputs.value("Roughness") > 1e-3:
         raise Refused(say("the model of rough glass is darker under lamps"))
     if inputs.value("Specular IOR Level") != 0.5:
@@ -87,6 +88,7 @@ def _plan_clear(material, node, inputs):
         raise Refused(say("it has {what}", what=Sentence("Specular Tint")))
     # Such a node tints the transmitted light alone, at each surface by the root of its colour.
     more = {"glows": glows(inputs), "transparent": is_transparent(inputs)}
+    more["below_coat"] = below_coat(inputs)
     if inputs.follows("Base Color"):
         more["root"] = ("refracted", "Base Color")
         return _glass_of(material, node, inputs, {}, {}, **more)
@@ -234,6 +236,32 @@ def _errors(found):
     return [error for light, error in found if light > _NO_LIGHT] or [0.0]
 
 
+#: View cosines over which errors are averaged.
+_VIEWS = np.linspace(0.95, 0.25, 8)
+
+
+def _taken_by_coat(inputs, below):
+    """The light that a coat keeps from what lies below, at its smallest and its largest weight.
+    `below`: as Plan.below_coat."""
+    if not below:
+        return (0.0,)
+    weights = np.clip(inputs.ends("Coat Weight"), 0, 1)
+    rough = 0.0 if len(below[0]) == 1 else inputs.ends("Coat Roughness")[0]
+    whole = 1 - float(layer.rest_at(below, _VIEWS, rough).mean())
+    return tuple(dict.fromkeys(float(weight) * whole for weight in weights))
+
+
+def _errors_below(found, taken):
+    """The errors of what lies below a coat, which is Blender's own, as shares of the light of
+    both."""
+    pairs = []
+    for light, error in found:
+        for share in taken:
+            below = (1 - share) * light
+            pairs.append((below + share, below * error / max(below + share, 1e-9)))
+    return _errors(pairs)
+
+
 def _found(fit):
     """(light, error) of all colours and roughnesses of a fit."""
     return list(itertools.chain(*fit.found))
@@ -345,22 +373,24 @@ def _plan_node(material, node, inputs):
         part, fit = near()
         return plan(part, [fit], _errors(_found(fit)))
     more = {"glows": glows(inputs), "transparent": is_transparent(inputs)}
+    more["below_coat"] = below_coat(inputs)
+    taken = _taken_by_coat(inputs, more["below_coat"])
     single = None
     if not inputs.follows("Metallic"):
         part, fit = near()
         is_pure = given["metallic"] in (0, 1)
         if is_pure or not varying and not (fit.lost and inputs.follows(color)):
-            single = plan(part, [fit], _errors(_found(fit)), **more)
+            single = plan(part, [fit], _errors_below(_found(fit), taken), **more)
         if is_pure:
             return single
     (part, plain), (metal, fit) = near(metallic=0.0), near(metallic=1.0)
     if (share := inputs.mean("Metallic")) is None:
-        errors = _errors(_found(plain) + _found(fit))
+        errors = _errors_below(_found(plain) + _found(fit), taken)
     else:
         share = min(max(share, 0.0), 1.0)
         of_colors = zip(plain.found, fit.found, strict=True)
         pairs = (pair for both in of_colors for pair in itertools.product(*both))
-        errors = _errors([_mixed(share, *pair) for pair in pairs])
+        errors = _errors_below([_mixed(share, *pair) for pair in pairs], taken)
     mixed = plan(part, [plain, fit], errors, metal=metal, **more)
     return mixed if single is None or mixed.error < single.error else single
 
@@ -425,7 +455,7 @@ def _of_group(made):
     if tree.is_embedded_data:
         return made
     others = tuple(m for m in model_nodes.users_of(tree) if m != made.material)
-    effective = effective_sockets(made.node)
+    effective = effective_sockets(made.node, bool(made.below_coat))
     kept = {name for socket in made.kept for name in _group_inputs(made.node.inputs[socket])}
     lost = [name for socket in effective for name in _group_inputs(socket) if name not in kept]
     return replace(made, others=others, unused=tuple(dict.fromkeys(lost)))
@@ -446,6 +476,11 @@ def _group_inputs(socket):
     return found
 
 
+def _stays(node):
+    """Whether a node is a model, or what can stay beside models."""
+    return node.bl_idname in STAYING or HELPS in node or model_nodes.is_ours(node)
+
+
 def _convertible(material):
     """The nodes of a material for which there is a Plan, in the order of its trees. In place of
     nodes in a group that is linked from another file, the group node."""
@@ -456,6 +491,6 @@ def _convertible(material):
         locked = (group for group in shown.within if not editable.keeps_changes(group.node_tree))
         if (group := next(locked, None)) is not None:
             found |= {group} if shown.node.bl_idname in KINDS else set()
-        elif shown.node.bl_idname not in STAYING and not model_nodes.is_ours(shown.node):
+        elif not _stays(shown.node):
             found.add(shown.node)
     return [node for node in model_nodes.all_nodes(material) if node in found]

@@ -11,15 +11,14 @@ from ..groups import bump_correction, model_nodes, nodes
 from ..nearest import native_bsdf
 from ..packs import pack
 from ..trees import animation, shader_trees, shader_values
-from .node_values import ANISOTROPY, KINDS, RATIO, has_own_animation
+from .node_values import ANISOTROPY, COAT_SOCKETS, KINDS, RATIO, has_own_animation
+from .planned_node import HELPS
 
 #: Custom property of a group node: the name of the node that it replaces.
 BEFORE = "brdfc_before"
 #: Whether Bump Map Correction was on at that time. Missing if an earlier version converted the
 #: node: that version turned it off. Missing as well in node groups, which several materials share.
 CORRECTED = "brdfc_before_bump_map_correction"
-#: Custom property of the nodes that were added along with it: the name of the group node.
-HELPS = "brdfc_helps"
 #: Custom property of a node to which animation was moved: {name: identifier of the socket of the
 #: replaced node from which it comes}. The name is that of a model's parameter, of a node's output,
 #: or INPUT and the identifier of a node's input.
@@ -196,7 +195,9 @@ class Replacement:
             shader = self._sum(shader, left.outputs[0])
         if plan.metal:
             shader = self._mix("Metallic", shader, others[-1])
-        if plan.glows:
+        if plan.below_coat:
+            shader = self._coated(shader)
+        elif plan.glows:
             emission = self._helper("ShaderNodeEmission")
             for name, socket in (("Color", "Emission Color"), ("Strength", "Emission Strength")):
                 self._give(emission.inputs[name], socket)
@@ -205,6 +206,34 @@ class Replacement:
             clear = self._helper("ShaderNodeBsdfTransparent")
             shader = self._mix("Alpha", clear.outputs[0], shader)
         return shader
+
+    def _coated(self, below):
+        """A shader under the coat of the node: the coat is that of a Principled node that has no
+        other effect but emission, which Cycles dims by the coat."""
+        coat = self._helper("ShaderNodeBsdfPrincipled")
+        # An IOR of 1 reflects nothing.
+        coat.inputs["Base Color"].default_value, coat.inputs["IOR"].default_value = (0, 0, 0, 1), 1
+        kept = ["Coat IOR", *(name for name in COAT_SOCKETS if name != "Coat Normal")]
+        kept += ["Emission Color", "Emission Strength"] if self._plan.glows else []
+        for name in kept:
+            self._give(coat.inputs[name], name)
+        for name in ("Normal", "Coat Normal"):
+            if source := self._source(name):
+                self._tree.links.new(source, coat.inputs[name])
+        normal = self._source("Coat Normal") or self._source("Normal")
+        rough = self._clamped("Coat Roughness") if len(self._plan.below_coat[0]) > 1 else None
+        rows = [self._polynomial(row, rough) for row in self._plan.below_coat]
+        rest = self._polynomial(rows, self._facing(normal))
+        weight = self._source("Coat Weight")
+        if weight is None:
+            weight = max(shader_values.constant(self._node.inputs["Coat Weight"]), 0.0)
+        taken = self._operation("ShaderNodeMath", "SUBTRACT", 1.0, rest)
+        taken = self._operation("ShaderNodeMath", "MULTIPLY", taken, weight)
+        left = self._helper("ShaderNodeMixShader")
+        links = self._tree.links
+        links.new(self._operation("ShaderNodeMath", "SUBTRACT", 1.0, taken), left.inputs[0])
+        links.new(below, left.inputs[2])
+        return self._sum(coat.outputs[0], left.outputs[0])
 
     def _helper(self, kind):
         """A node that is added along with a group to replace the node."""
@@ -223,22 +252,26 @@ class Replacement:
 
     def _rest(self):
         """Nodes for the light that a layer leaves to its base, the polynomial of layer.rest()."""
-        # With this Blend, Facing is 1 minus the cosine.
-        view = self._helper("ShaderNodeLayerWeight")
-        view.inputs["Blend"].default_value = 0.5
-        if source := self._source("Normal"):
-            # Where the normal faces away from the viewer, Cycles bends it back.
-            if group := group_content.bent_normal_group(self._plan.model):
-                bent = self._helper("ShaderNodeGroup")
-                bent.node_tree = group
-                self._tree.links.new(source, bent.inputs["Normal"])
-                source = bent.outputs["Normal"]
-            self._tree.links.new(source, view.inputs["Normal"])
         rest = self._plan.rest
         varies = len(rest[0]) > 1
         of = (self._share if self._plan.varying else self._roughness)() if varies else None
         rows = [self._polynomial(row, of) for row in rest]
-        return self._polynomial(rows, view.outputs["Facing"])
+        return self._polynomial(rows, self._facing(self._source("Normal")))
+
+    def _facing(self, normal):
+        """1 minus the cosine of the view. `normal`: an output, or None for the surface's own."""
+        # With this Blend, Facing is 1 minus the cosine.
+        view = self._helper("ShaderNodeLayerWeight")
+        view.inputs["Blend"].default_value = 0.5
+        if normal:
+            # Where the normal faces away from the viewer, Cycles bends it back.
+            if group := group_content.bent_normal_group(self._plan.model):
+                bent = self._helper("ShaderNodeGroup")
+                bent.node_tree = group
+                self._tree.links.new(normal, bent.inputs["Normal"])
+                normal = bent.outputs["Normal"]
+            self._tree.links.new(normal, view.inputs["Normal"])
+        return view.outputs["Facing"]
 
     def _roughness(self):
         """The linked roughness between 0 and 1."""

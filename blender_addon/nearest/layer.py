@@ -12,6 +12,7 @@ from . import native_bsdf
 #: View cosines and roughnesses to which the polynomials are fitted. Nearer to the horizon a surface
 #: fills few pixels.
 _COSINES = np.linspace(0.03, 1, 33)
+_VIEWS = np.stack([np.sqrt(1 - _COSINES**2), 0 * _COSINES, _COSINES], -1)
 _ROUGHNESSES = np.linspace(0.1, 1, 10)
 #: Degrees in 1 - cos and in a roughness that varies. With 5 and 4 the albedo is off by at most
 #: 0.02, and by 0.006 at cosines from 0.2 and roughnesses from 0.2.
@@ -24,12 +25,32 @@ def rest(f0, tint, multiscatter, roughness=None):
     polynomial. Returns ((c00, c01, ...), (c10, ...), ...), the coefficients of (1 - cos)^i
     roughness^j. `tint`: the largest channel of the tint of f0. `roughness`: the only one that
     matters; None: all of them."""
-    roughnesses = _ROUGHNESSES if roughness is None else np.array([roughness])
-    views = np.stack([np.sqrt(1 - _COSINES**2), 0 * _COSINES, _COSINES], -1)
     plastic = native_bsdf.Native("principled", (1.0, 1.0, 1.0), f0=f0, multiscatter=multiscatter)
     plastic = replace(plastic, tint=(tint,))  # the only channel that matters
-    nodes = [replace(plastic, roughness=r) for r in roughnesses]
-    left = 1 - np.stack([native_bsdf.view_terms(node, views).taken for node in nodes])
+    return _of_roughness(
+        lambda node: native_bsdf.view_terms(node, _VIEWS).taken, plastic, roughness
+    )
+
+
+@functools.lru_cache(maxsize=64)
+def below_coat(f0, roughness=None):
+    """The same for the coat of a Principled node, of which Cycles takes the albedo as it is."""
+
+    def taken(node):
+        if node.is_mirror:
+            return native_bsdf.gloss_fresnel(node, _COSINES).max(-1)
+        return native_bsdf.facet_albedo(
+            _VIEWS, node.mean_alpha, False, lambda c: native_bsdf.gloss_fresnel(node, c)
+        ).max(-1)
+
+    coat = native_bsdf.Native("principled", (0.0, 0.0, 0.0), f0=f0)
+    return _of_roughness(taken, coat, roughness)
+
+
+def _of_roughness(taken, native, roughness):
+    """The polynomial for 1 - taken(native) at a roughness, or at all."""
+    roughnesses = _ROUGHNESSES if roughness is None else np.array([roughness])
+    left = 1 - np.stack([taken(replace(native, roughness=r)) for r in roughnesses])
     degree = _DEGREE_ROUGHNESS if roughness is None else 0
     of_view = (1 - _COSINES)[:, None] ** np.arange(_DEGREE + 1)
     of_width = roughnesses[:, None] ** np.arange(degree + 1)
@@ -51,10 +72,9 @@ def rest_of_share(native, at, least):
     """The same for at(native, share), where the share varies from 0 to 1: coefficients of
     (1 - cos)^i share^j. `least`: the lowest share but 0 to which it is fitted."""
     shares = np.concatenate([[0.0], np.linspace(least, 1, 12)])
-    views = np.stack([np.sqrt(1 - _COSINES**2), 0 * _COSINES, _COSINES], -1)
     native = replace(native, color=(1.0, 1.0, 1.0), tint=(max(native.tint),))
     nodes = [at(native, share) for share in shares]
-    left = 1 - np.stack([native_bsdf.view_terms(node, views).taken for node in nodes])
+    left = 1 - np.stack([native_bsdf.view_terms(node, _VIEWS).taken for node in nodes])
     of_view = (1 - _COSINES)[:, None] ** np.arange(_DEGREE + 1)
     of_share = shares[:, None] ** np.arange(_DEGREE_SHARE + 1)
     terms = (of_view[None, :, :, None] * of_share[:, None, None, :]).reshape(left.size, -1)

@@ -718,7 +718,7 @@ def test_the_colour_of_a_mirror_may_be_linked(extension, convert, kind, inputs, 
 
 ANIMATED = [
     ("principled", {"Metallic": 0.5}, "IOR", driven),
-    ("principled", {}, "Coat Weight", keyed),
+    ("principled", {"Coat_Weight": 0.5}, "Coat IOR", keyed),
     ("glossy", {}, "Anisotropy", played),
     ("glass", {}, "Roughness", keyed),
 ]
@@ -733,6 +733,34 @@ def test_what_no_animation_can_move_stays_and_is_said(
     plan = only(extension.api.plan_conversion([material]))
     assert plan.refusal == f"{socket} is animated"
     assert extension.api.convert_materials([plan]) == 0 and node.outputs[0].is_linked
+
+
+def test_a_coat_stays_blenders_own(extension, convert):
+    """Also where its weight, roughness and normal are linked or animated, and over what glows. What
+    was added is not converted again, and goes with the model."""
+    material, node = material_of(
+        "principled", Coat_Weight=0.7, Coat_IOR=1.8, Metallic=0.5, Emission_Strength=0.2
+    )
+    keyed(node.inputs["Coat Weight"])
+    for socket in ("Coat Roughness", "Coat Normal"):
+        linked(material, node, socket, "ShaderNodeTexNoise")
+    plan = only(extension.api.plan_conversion([material]))
+    assert set(plan.kept) >= {"Coat Weight", "Coat Roughness", "Coat Normal"}
+    uncoated = only(convert.plan([material_of("principled", Metallic=0.5)[0]]))
+    assert 0 < plan.least_error < plan.error <= uncoated.error
+    count = len(material.node_tree.nodes)
+    assert extension.api.convert_materials([plan]) == 1
+    coats = [n for n in material.node_tree.nodes if n.bl_idname == node.bl_idname and n != node]
+    (coat,) = coats
+    assert coat.inputs["Coat IOR"].default_value == pytest.approx(1.8)
+    assert coat.inputs["Base Color"].default_value[:3] == (0, 0, 0)
+    assert coat.inputs["IOR"].default_value == 1 and coat.outputs[0].is_linked
+    for socket in ("Coat Weight", "Coat Roughness", "Coat Normal", "Emission Strength"):
+        held = coat.inputs[socket]
+        assert held.is_linked or held.default_value == pytest.approx(0.2)
+    assert not convert.plan([material])
+    assert convert.restore(material) == 1
+    assert len(material.node_tree.nodes) == count and node.outputs[0].is_linked
 
 
 def test_an_animated_distribution_is_said(convert):
@@ -877,7 +905,7 @@ def test_a_linked_roughness_is_followed(extension, convert):
 
 
 REFUSED = [
-    ("principled", {"Coat_Weight": 0.5}, "it has Coat"),
+    ("principled", {"Coat_Weight": 0.5, "Coat_Tint": (1.0, 0.5, 0.5)}, "it has Coat Tint"),
     ("principled", {"Transmission_Weight": 0.9}, "it has Transmission"),
     ("principled", {"Transmission_Weight": 1.0, "Metallic": 0.5}, "it has Transmission"),
     ("principled", {"Transmission_Weight": 1.0}, "the model of rough glass is darker under lamps"),
@@ -885,11 +913,6 @@ REFUSED = [
         "principled",
         {"Transmission_Weight": 1.0, "Roughness": 0.0, "Specular_IOR_Level": 0.4},
         "it has Specular IOR Level",
-    ),
-    (
-        "principled",
-        {"Transmission_Weight": 1.0, "Roughness": 0.0, "Coat_Weight": 0.4},
-        "it has Coat",
     ),
     ("principled", {"Subsurface_Weight": 0.2}, "it has Subsurface"),
     ("glass", {"Roughness": 0.3}, "the model of rough glass is darker under lamps"),
@@ -928,7 +951,7 @@ def test_links_that_no_model_follows_are_named(extension, convert, inputs, socke
 
 LINKED = [
     ("principled", {"Metallic": 0.5}, "IOR"),
-    ("principled", {}, "Coat Weight"),
+    ("principled", {"Coat_Weight": 0.5}, "Coat IOR"),
 ]
 
 

@@ -16,6 +16,7 @@ STATES = {
     "glass": ("glass", {"Roughness": 0.0}),
     "plastic": ("principled", {"Roughness": 0.4}),
     "polished plastic": ("principled", {"Roughness": 0.0}),
+    "coated": ("principled", {"Roughness": 0.4, "Coat_Weight": 0.7, "Coat_Roughness": 0.2}),
     "metal": ("principled", {"Roughness": 0.5, "Metallic": 1.0, "Anisotropic": 0.7}),
     "matte": ("principled", {"IOR": 1.0, "Anisotropic": 0.5}),
     "clear": ("principled", {"Roughness": 0.0, "Transmission_Weight": 1.0, "Base_Color": (1,) * 3}),
@@ -25,11 +26,11 @@ STATES = {
 NUMBERS = (-1.2, 0.0, 0.3, 1.8)
 COLORS = ((0.8, 0.3, 0.1, 1.0), (0.02, 0.05, 0.1, 1.0))
 VECTORS = ((0.3, -0.8, 0.5),)
-#: Inputs of effects that are off in these states. They are set in one state alone.
+#: Inputs of effects that are off in most states. They are set in one state alone.
 EFFECTS = ("Subsurface ", "Coat ", "Sheen ", "Thin Film ")
 #: States in which most inputs count, so most materials differ after conversion. They are shown
 #: without Open Shading Language, which would compile each of them; that doubled the test's time.
-MANY = ("plastic", "polished plastic", "metal", "glowing")
+MANY = ("plastic", "polished plastic", "coated", "metal", "glowing")
 #: Pixels across a ball with its margin, samples of each, and balls in a row of a picture.
 PIXELS, SAMPLES, ROW = 16, 64, 12
 
@@ -75,7 +76,12 @@ def cases(state):
         return node
 
     for index, socket in enumerate(add("as it is").inputs):
-        if not socket.enabled or (state != "plastic" and socket.name.startswith(EFFECTS)):
+        is_effect = socket.name.startswith(EFFECTS)
+        if state == "coated":
+            counts = socket.name.startswith("Coat ")
+        else:
+            counts = state == "plastic" or not is_effect
+        if not socket.enabled or not counts:
             continue
         for value in values_of(socket):
             add(f"{socket.name} {value}").inputs[index].default_value = value
