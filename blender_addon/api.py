@@ -334,7 +334,7 @@ def _set(node, what, parameters):
         ):
             raise ValueError(
                 f"{name!r} of {what} is {model_nodes.get_value(node, name)!r}, the only value of a "
-                f"lean material; switch_representation() brings the others back; got {value!r}"
+                f"lean material; switch_representation() restores the others; got {value!r}"
             )
         if name in present and shader_trees.is_driven(present[name]):
             raise ValueError(

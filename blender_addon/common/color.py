@@ -59,9 +59,7 @@ def set_srgb(image):
         if name in known:
             settings.name = name
             return
-    raise ValueError(
-        f"the OpenColorIO configuration has no sRGB under a name that is known here: {known}"
-    )
+    raise ValueError(f"the OpenColorIO configuration has no sRGB under a known name: {known}")
 
 
 def set_view(settings, name):

@@ -217,7 +217,7 @@ class Plan(Part):
             said = say("{row}. Inputs of the group without effect: {names}", row=said, names=names)
         if self.readers:
             said = say(
-                "{row}. Drivers of {names} read its {sockets}, and go on reading the replaced node",
+                "{row}. Drivers of {names} read its {sockets}: they still read the replaced node",
                 row=said,
                 names=", ".join(self.readers),
                 sockets=", ".join(self.read),

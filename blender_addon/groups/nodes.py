@@ -412,8 +412,7 @@ def add_albedo(node):
         if model_nodes.is_baked(node):
             raise ValueError(
                 say(
-                    "{node} is lean: choose a render method first, which brings the whole model "
-                    "back",
+                    "{node} is lean: choose a render method first, which restores the whole model",
                     node=name,
                 )
             )

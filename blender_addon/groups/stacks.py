@@ -91,7 +91,10 @@ def surface_of(material):
     link = shader_trees.surface_link(tree)
     if link is None:
         raise ValueError(
-            say("Nothing leads to the surface of material {material!r}", material=material.name)
+            say(
+                "Nothing is connected to the surface of material {material!r}",
+                material=material.name,
+            )
         )
     return link
 

@@ -16,7 +16,7 @@ def make():
     """An empty shared group."""
     group = bpy.data.node_groups.new(GROUP, "ShaderNodeTree")
     group[TAG] = 1
-    group.description = "Where the lamps are: what forms aim at. Kept current by brdfc"
+    group.description = "The lamps that materials of brdfc use. Updated by brdfc"
     end = group.nodes.new("NodeGroupOutput")
     end.location = (300, 0)
     for index, name in enumerate(slots.part_names(slots.SLOTS)):

@@ -90,7 +90,7 @@ def by_slot(parts):
 
 
 #: Why a lamp that random rays hit is left out.
-NO_NEED = say("so large or near that random rays meet it often")
+NO_NEED = say("so large or near that random rays hit it often")
 
 
 def too_many(slots):
@@ -103,7 +103,7 @@ def too_many(slots):
 def elsewhere(library):
     """Why a material that is linked from another file aims at no lamp of this one."""
     return say(
-        "the material is linked from {file} and knows the lamps of that file", file=library.filepath
+        "the material is linked from {file} and uses the lamps of that file", file=library.filepath
     )
 
 

@@ -126,8 +126,8 @@ class BRDFC_OT_search(Operator):
     bl_idname = "brdfc.search"
     bl_label = "Search Reflection Models..."
     bl_description = (
-        "Find a model by its name, or by authors, title and year of its paper; a shader "
-        "editor gets a node of it, elsewhere a material is made"
+        "Find a model by its name, or by the authors, title or year of its paper. In a shader "
+        "editor this adds a node, elsewhere it makes a material"
     )
     bl_options = {"REGISTER", "UNDO"}
     bl_property = "model"

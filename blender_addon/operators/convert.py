@@ -23,14 +23,14 @@ class BRDFC_OT_convert(Operator):
     bl_idname = "brdfc.convert"
     bl_label = "Convert to Reflection Models"
     bl_description = (
-        "Put the nearest model in place of each Principled, Glossy, Diffuse or Glass node "
-        "of the selected objects' materials; links stay, and it can be taken back"
+        "Replace each Principled, Glossy, Diffuse or Glass node of the selected objects' "
+        "materials by the nearest model. Links stay, and the nodes can be restored"
     )
     bl_options = {"REGISTER", "UNDO"}
 
     limit: FloatProperty(
         name="Largest Error",
-        description="Nodes stay whose nearest model sends more of the light elsewhere",
+        description="Nodes stay if the error of the nearest model is larger",
         subtype="PERCENTAGE",
         default=100 * convert.LIMIT,
         min=0,
@@ -91,8 +91,8 @@ class BRDFC_OT_convert_back(ChangesActiveMaterial, Operator):
     bl_idname = "brdfc.convert_back"
     bl_label = "Back to Blender's Nodes"
     bl_description = (
-        "Put Blender's own nodes back into the active material; where they were "
-        "deleted, nodes that come close to the model"
+        "Restore Blender's own nodes in the active material. If they were deleted, nodes that "
+        "approximate the model replace them"
     )
     bl_options = {"REGISTER", "UNDO"}
 

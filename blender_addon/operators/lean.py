@@ -15,7 +15,8 @@ class BRDFC_OT_write_materials(Operator):
     bl_idname = "brdfc.write_materials"
     bl_label = "Write Materials"
     bl_description = (
-        "List what this file uses, for `brdfc build --materials` to make an extension of it alone"
+        "Write a list of what this file uses, from which `brdfc build --materials` makes an "
+        "extension for this file only"
     )
     bl_options = {"REGISTER"}
 
@@ -42,9 +43,11 @@ class BRDFC_OT_write_materials(Operator):
 class _Budget:
     error: FloatProperty(
         name="Error in Percent",
-        description="Error up to which a material may become Fitted, to have less noise: the part "
-        "of the reflected light that may go in other directions than the model says. 0: every "
-        "material keeps its render method",
+        description=(
+            "Largest error at which a material becomes Fitted, for less noise: the fraction of "
+            "the reflected light that leaves in other directions than in the model. 0: every "
+            "material keeps its render method"
+        ),
         min=0,
         max=100,
         default=0,
@@ -52,8 +55,10 @@ class _Budget:
 
     fit: BoolProperty(
         name="Fit Closures",
-        description="Less noise of the render methods Aimed and Sampled under skies and images, "
-        "for seconds to minutes of work a material",
+        description=(
+            "Reduce the noise of the render methods Aimed and Sampled under skies and images. "
+            "This takes seconds to minutes for each material"
+        ),
         default=False,
     )
 
@@ -65,7 +70,7 @@ class BRDFC_OT_bake(ModalJob, _Budget, Operator):
     bl_idname = "brdfc.bake"
     bl_label = "Bake Lean Materials"
     bl_description = (
-        "Give the materials shaders that hold no more than this file needs; the program brdfc "
+        "Give the materials shaders that contain only what this file needs. The program brdfc "
         "makes them"
     )
     bl_options = {"REGISTER", "UNDO"}
@@ -93,7 +98,7 @@ class BRDFC_OT_bake(ModalJob, _Budget, Operator):
 class BRDFC_OT_bake_plan(_Budget, Operator):
     bl_idname = "brdfc.bake_plan"
     bl_label = "Bake Lean Materials"
-    bl_description = "Show what lean materials would hold, and bake them"
+    bl_description = "Show what lean materials would contain, and bake them"
     bl_options = {"INTERNAL"}
 
     plan, planned_with = None, None  # class attributes, which brdfc.bake sets
@@ -123,7 +128,7 @@ class BRDFC_OT_bake_plan(_Budget, Operator):
 class BRDFC_OT_bake_apply(ModalJob, Operator):
     bl_idname = "brdfc.bake_apply"
     bl_label = "Bake Lean Materials"
-    bl_description = "Put the lean shaders of a plan into the materials"
+    bl_description = "Apply the lean shaders of a plan to the materials"
     bl_options = {"INTERNAL", "UNDO"}
 
     @classmethod

@@ -34,7 +34,7 @@ class BRDFC_OT_new_measured_material(ModalJob, Operator):
     bl_idname = "brdfc.new_measured_material"
     bl_label = "New Measured Material..."
     bl_description = (
-        "Make a material that comes close to a measured BRDF: a file of MERL (.binary), RGL "
+        "Make a material that approximates a measured BRDF: a file of MERL (.binary), RGL "
         "(.bsdf), UTIA (.bin) or ALTA (.alta, .dat), or a table (.csv). The program brdfc fits "
         "every model to it"
     )
@@ -86,8 +86,8 @@ class BRDFC_OT_new_measured_library(ModalJob, Operator):
     bl_idname = "brdfc.new_measured_library"
     bl_label = "New Measured Library..."
     bl_description = (
-        "Make an asset of each measured BRDF in a folder and its subfolders, with the model that "
-        "comes closest and a preview, and write them to measured.blend in that folder"
+        "Make an asset of each measured BRDF in a folder and its subfolders, with the nearest "
+        "model and a preview, and write them to measured.blend in that folder"
     )
     bl_options = {"REGISTER"}
 
@@ -121,8 +121,7 @@ class BRDFC_OT_new_measured_library(ModalJob, Operator):
             self.report({"WARNING"}, rpt(said))
         if made.notes:
             said = say(
-                "Files with notes on what their data lack, which the descriptions of their assets "
-                "have: {count}",
+                "Files whose data are incomplete, see the descriptions of their assets: {count}",
                 count=len(made.notes),
             )
             self.report({"INFO"}, rpt(said))
@@ -155,7 +154,7 @@ def _fits_as_items(_operator, _context):
             fit.model,
             iface(
                 say(
-                    "{model}: {percent} % of the light in other directions",
+                    "{model}: error {percent} %",
                     model=pack.model(fit.model).label,
                     percent=in_percent(fit.error),
                 )
@@ -171,7 +170,7 @@ def _fits_as_items(_operator, _context):
 
 def _sum_as_item(found):
     said = say(
-        "Sum of {count} lobes: {percent} % of the light in other directions",
+        "Sum of {count} lobes: error {percent} %",
         count=len(found.lobes),
         percent=in_percent(found.error),
     )
@@ -182,7 +181,7 @@ def _sum_as_item(found):
 class BRDFC_OT_choose_measured(Operator):
     bl_idname = "brdfc.choose_measured"
     bl_label = "New Measured Material"
-    bl_description = "Choose among the models that come close to a measured BRDF"
+    bl_description = "Choose one of the models that are nearest to a measured BRDF"
     bl_options = {"INTERNAL", "UNDO"}
 
     found = None  # class attribute, which brdfc.new_measured_material sets

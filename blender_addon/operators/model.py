@@ -68,9 +68,8 @@ class BRDFC_OT_details(OfActiveMaterial, Operator):
     bl_idname = "brdfc.details"
     bl_label = "What This Means"
     bl_description = (
-        "Of the light that this material reflects, the part that goes in other "
-        "directions than the model says, on average over views: at an error of 1.2 %, 1.2 of 100 "
-        "parts, and 1 % is hard to see. Click for more figures"
+        "The fraction of the reflected light that leaves in other directions than in the model, "
+        "averaged over views. 1 % is hard to see. Click for more figures"
     )
     bl_options = {"INTERNAL"}
 
@@ -123,8 +122,8 @@ class BRDFC_OT_update(Operator):
     bl_idname = "brdfc.update"
     bl_label = "Update Materials"
     bl_description = (
-        "Give the models that another version of the extension made the shaders of this "
-        "one, where all that they are set to can stay"
+        "Update models of other versions of the extension to the shaders of this version, if all "
+        "of their settings can stay"
     )
     bl_options = {"REGISTER", "UNDO"}
 
@@ -143,7 +142,7 @@ class BRDFC_OT_add_albedo(ChangesActiveMaterial, Operator):
     bl_idname = "brdfc.add_albedo"
     bl_label = "Add Albedo Output"
     bl_description = (
-        "Give the model's node an output for its albedo, whose tables make the file larger"
+        "Add an output for the albedo to the model's node. Its tables make the file larger"
     )
     bl_options = {"REGISTER", "UNDO"}
 
@@ -179,7 +178,8 @@ class BRDFC_OT_kernel(ChangesActiveMaterial, Operator):
     bl_idname = "brdfc.kernel"
     bl_label = "Kernel from Float Curve"
     bl_description = (
-        "Draw the kernel of a lossless reflection by a Float Curve node of the same nodes"
+        "Set the kernel of a lossless reflection to the curve of a Float Curve node in the "
+        "same node tree"
     )
     bl_options = {"REGISTER", "UNDO"}
 
@@ -267,7 +267,7 @@ class BRDFC_OT_substance(ChangesActiveMaterial, Operator):
     )
     thickness: FloatProperty(
         name="Thickness in Metres",
-        description="What absorbs inside has its exact colour after this distance",
+        description="Distance after which the colour of an absorbing material is exact",
         default=0.01,
         min=1e-6,
         max=1e6,

@@ -14,8 +14,8 @@ class BRDFC_OT_add_library(ModalJob, Operator):
     bl_idname = "brdfc.add_library"
     bl_label = "Add the brdfc Materials to the Asset Browser"
     bl_description = (
-        "Make a library of ready-made materials and name it in the preferences: from then "
-        "on they are in the Asset Browser, to be dragged onto objects"
+        "Make a library of ready-made materials and add it to the preferences. You can then drag "
+        "the materials from the Asset Browser onto objects"
     )
     bl_options = {"REGISTER"}
 
@@ -46,7 +46,7 @@ class BRDFC_OT_remove_library(Operator):
     bl_idname = "brdfc.remove_library"
     bl_label = "Remove the brdfc Materials from the Asset Browser"
     bl_description = (
-        "Take the library out of the preferences and delete it; materials in files stay as they are"
+        "Remove the library from the preferences and delete it. Materials in files stay as they are"
     )
     bl_options = {"REGISTER"}
 
@@ -75,13 +75,17 @@ class BrdfcPreferences(AddonPreferences):
 
     program: StringProperty(
         name="Program brdfc",
-        description="What Bake Lean Materials runs; empty: it is looked for on the PATH",
+        description=(
+            "The program that Bake Lean Materials runs. If empty, it is searched for on the PATH"
+        ),
         subtype="FILE_PATH",
     )
     update_on_load: BoolProperty(
         name="Update Materials of Files That Are Opened",
-        description="Give models that another version of this extension made the shaders of this "
-        "one when a file is opened, where all that they are set to can stay. Pictures may change",
+        description=(
+            "When a file is opened, update models of other versions of this extension to the "
+            "shaders of this version, if all of their settings can stay. Pictures may change"
+        ),
         default=False,
     )
 

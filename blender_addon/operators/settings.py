@@ -12,7 +12,7 @@ from .common import ChangesActiveMaterial, OfActiveMaterial, refused
 class BRDFC_OT_enable_osl(Operator):
     bl_idname = "brdfc.enable_osl"
     bl_label = "Turn On OSL"
-    bl_description = "Turn on Open Shading Language, which these shaders need, and Cycles with it"
+    bl_description = "Turn on Cycles and Open Shading Language, which these shaders need"
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context):
@@ -44,7 +44,7 @@ class BRDFC_OT_no_guiding(Operator):
     bl_idname = "brdfc.no_guiding"
     bl_label = "Turn Off Path Guiding"
     bl_description = (
-        "Turn path guiding off, which makes materials of this extension wrong or only slower"
+        "Turn off Path Guiding, which makes materials of this extension wrong or only slower"
     )
     bl_options = {"REGISTER", "UNDO"}
 
@@ -57,8 +57,7 @@ class BRDFC_OT_find_lamps(Operator):
     bl_idname = "brdfc.find_lamps"
     bl_label = "Find Lamps"
     bl_description = (
-        "Look again for the lamps that materials know of and show without noise, the "
-        "brightest first"
+        "Search for lamps again. Materials show the light of the brightest ones with little noise"
     )
     bl_options = {"REGISTER", "UNDO"}
 
@@ -78,8 +77,8 @@ class BRDFC_OT_enlarge_lamps(Operator):
     bl_idname = "brdfc.enlarge_lamps"
     bl_label = "Give Lamps a Size"
     bl_description = (
-        "Give lamps that are too small to be met by chance 1 cm, and suns a little more than a "
-        "degree; they shine as before, with softer shadows"
+        "Enlarge lamps that are too small for random rays to hit: to 1 cm, and suns to a little "
+        "more than a degree. Their light stays the same, with softer shadows"
     )
     bl_options = {"REGISTER", "UNDO"}
 
@@ -97,8 +96,8 @@ class BRDFC_OT_make_local(OfActiveMaterial, Operator):
     bl_idname = "brdfc.make_local"
     bl_label = "Make Local"
     bl_description = (
-        "Make the active material this file's own, with object and data where they "
-        "are linked, so that it can be changed and knows the lamps of this file"
+        "Make the active material local, and its object and data if they are linked. It can then "
+        "be changed, and uses the lamps of this file"
     )
     bl_options = {"REGISTER", "UNDO"}
 

@@ -120,8 +120,8 @@ def _check_fixed(model, substance, value_of):
     if other:
         raise ValueError(
             say(
-                "This extension was built for one scene: {names} of {model} can't be those of "
-                "{substance}; build it again, or take the whole extension",
+                "This extension was built for one scene: {names} of {model} can't be set to the "
+                "values of {substance}; build it again, or use the whole extension",
                 names=", ".join(other),
                 model=model.label,
                 substance=substance.label,

@@ -6,8 +6,8 @@ from ..common.i18n import say
 #: Tooltip of each form; "form" is the name in scripts, the interface says "render method".
 METHODS = {
     "auto": say(
-        "Automatic: Exact or Aimed with Open Shading Language on, Formula Nodes with it off and on "
-        "GPUs. The material follows when you change that"
+        "Automatic: Exact or Aimed with Open Shading Language on, Formula Nodes with it off and "
+        "on GPUs. The material adapts when you change these settings"
     ),
     "exact": say(
         "Exact: Cycles' own shaders add up to the model. No error, and the noise of Blender's own "
@@ -18,11 +18,11 @@ METHODS = {
         "average, and little noise"
     ),
     "sampled": say(
-        "Sampled: random rays alone, which rarely meet small lamps. No error on average, and much "
+        "Sampled: random rays only, which rarely hit small lamps. No error on average, but much "
         "noise"
     ),
     "fitted": say(
-        "Fitted: eight of Cycles' own shaders that come close to the model. A small error, and the "
+        "Fitted: eight of Cycles' own shaders that approximate the model. A small error, and the "
         "noise of Blender's own nodes"
     ),
     "nodes": say(
@@ -30,7 +30,7 @@ METHODS = {
         "every device and without Open Shading Language, and more noise under skies"
     ),
     "twin": say(
-        "Blender Nodes: Glossy and Diffuse nodes that come close to the model, for quick looks. "
-        "EEVEE and Material Preview show them in any case. A larger error"
+        "Blender Nodes: Glossy and Diffuse nodes that approximate the model, with a larger error. "
+        "EEVEE and Material Preview always show them"
     ),
 }

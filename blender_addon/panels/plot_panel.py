@@ -87,7 +87,7 @@ def _form_said(node, legend):
     if legend.form is not None:
         percent = _percent(legend.form)
         return say(
-            "Dotted: render method {form}. {percent} % of its light goes elsewhere",
+            "Dotted: render method {form}, error {percent} %",
             form=form,
             percent=percent,
         )
@@ -110,7 +110,7 @@ def _legend(node, legend):
     if near := legend.principled:
         percent = _percent(near.error)
         yield say(
-            "Dashed: the nearest Principled. {percent} % of its light goes elsewhere",
+            "Dashed: the nearest Principled, error {percent} %",
             percent=percent,
         )
         yield say(
@@ -143,7 +143,7 @@ def draw_plots(layout, material):
         for said in _legend(node, legend):
             wrapped(column, said)
         wrapped(column, say("Middle: under a lamp, by the strokes below"))
-        wrapped(column, say("Below: reflected share, views from 0\u00b0 to 90\u00b0"))
+        wrapped(column, say("Below: albedo, views from 0° to 90°"))
         _, linked = _values(node)
         if linked:
             labels = pack.model(model_nodes.identity(node).model).parameters

@@ -114,11 +114,12 @@ def details(node, form):
             (
                 "relative_l1",
                 say(
-                    "Part of the reflected light that goes in other directions than the model says"
+                    "Fraction of the reflected light that leaves in other directions than in "
+                    "the model"
                 ),
             ),
-            ("relative_l2", say("The same by squares, to which bright spots count more")),
-            ("albedo", say("Largest error of how much is reflected, of a white surface")),
+            ("relative_l2", say("The same by squared differences: bright spots count more")),
+            ("albedo", say("Largest error of the albedo of a white surface")),
         )
         if error.get(key) is not None
     ]
@@ -179,7 +180,9 @@ def _draw_form(layout, node, form, scene, changes):
     if lean := model_nodes.is_baked(node):
         wrapped(
             layout,
-            say("Lean: only what this file needs. A render method brings the whole model back"),
+            say(
+                "Lean: only what this file needs. Choosing a render method restores the whole model"
+            ),
         )
     model = pack.model(model_name)
     row = layout.row(align=True)

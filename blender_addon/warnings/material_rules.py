@@ -34,7 +34,7 @@ def few_lamps(at):
         return
     if at.use.is_limited_by_stack():
         what = f"{at.use.trees} models" if at.use.trees > 1 else "a large model"
-        taken = f"{what} as Formula Nodes, and Cycles keeps 255 numbers at a time"
+        taken = f"{what} as Formula Nodes, and Cycles has room for 255 numbers"
     else:
         taken = f"{at.use.slots} of {most} slots of closures, and {at.use.slots_per_lamp} a lamp"
     yield {"count": room, "taken": taken}

@@ -117,8 +117,8 @@ OF_NODE = (
     Row(
         "out_of_fit",
         WARNING,
-        "{parameter} is {value}; the render method {form} knows values from {low} to {high} and "
-        "shows the nearer end of that",
+        "{parameter} is {value}; the render method {form} supports values from {low} to {high} "
+        "and shows the nearest of these",
         node_rules.out_of_fit,
     ),
     Row(
@@ -173,7 +173,7 @@ OF_NODE = (
         "small_in_mirror",
         WARNING,
         "Small lamps ({lamps}) are rare, bright dots in this material's mirror: larger lamps or "
-        "more samples help; a clamp on indirect light takes dots and light away",
+        "more samples help; a clamp on indirect light removes the dots and their light",
         lamp_rules.small_in_mirror,
     ),
     Row(
@@ -195,8 +195,8 @@ OF_NODE = (
     Row(
         "ray_visibility",
         WARNING,
-        "Ray Visibility of lamps ({lamps}) is off for diffuse or glossy rays: how much of the "
-        "model that takes away differs with the render method",
+        "Ray Visibility of lamps ({lamps}) is off for diffuse or glossy rays: how much of this "
+        "material's light is lost depends on the render method",
         lamp_rules.hidden_from_rays,
     ),
     Row(
@@ -214,8 +214,8 @@ DECLARED = (
     Row(
         "bump_correction",
         ERROR,
-        "Bump Map Correction is on in the material's settings: this material sends light the wrong "
-        "way where it is seen from the side",
+        "Bump Map Correction is on in the material's settings: this material reflects light in "
+        "wrong directions where it is seen from the side",
         setting_rules.bump_correction,
         SET_UP,
     ),
@@ -316,7 +316,7 @@ OF_MATERIAL = (
     Row(
         "closures",
         ERROR,
-        "The shaders of this material are more than Cycles keeps, and light is lost: use fewer "
+        "This material has more closures than Cycles has room for, and light is lost: use fewer "
         "models in one material",
         material_rules.too_many_closures,
         more="{slots} slots of closures, and Cycles has {most}",

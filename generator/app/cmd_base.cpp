@@ -19,9 +19,9 @@ void add_base_command(Command app) {
   auto o = std::make_shared<Options>();
   const Command cmd = app.add_subcommand(
       "base",
-      "The share of f cos that the closures of a model's base carry, by view angle; and the variance of one drawn\n"
-      "direction, divided by the squared albedo, in a white world and under a smooth sky: if the model draws all of\n"
-      "f cos, and if the aimed form draws only the rest beside the base.\n"
+      "Fraction of f cos that the closures of a model's base carry, by view angle. Also the variance of one sampled\n"
+      "direction, divided by the squared albedo, in a white world and under a smooth sky: *_drawn if the model is\n"
+      "sampled without a base, *_rest if the aimed form samples only the rest.\n"
       "stdout: CSV with header "
       "theta_o,relative_l1,share,best_scale,white_drawn,white_rest,sky_drawn,sky_rest,largest:\n"
       "        the integrals of |f cos - base| and of the base, divided by the albedo; the factor for the base with "
@@ -29,7 +29,7 @@ void add_base_command(Command app) {
       "        least variance; the variances; and the largest contribution of one direction of the rest");
   cmd.add_option("model", o->model, "Model, as in `brdfc list`").required();
   cmd.add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
-  add_numbers(cmd, "--angles", o->angles, {0, 89.999}, "Angles of the view to the normal in degrees");
+  add_numbers(cmd, "--angles", o->angles, {0, 89.999}, "View angles in degrees from the normal");
   add_number(cmd, "--phi", o->phi, {-7, 7}, "Azimuth of the view direction in radians");
   add_number(cmd, "--points", o->points, {64, 1 << 26}, "Directions for each view");
   cmd.callback([o] {

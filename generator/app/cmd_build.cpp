@@ -230,7 +230,7 @@ void run(const Options& options) {
 
 void add_build_command(Command app) {
   auto options = std::make_shared<Options>();
-  const Command c = app.add_subcommand("build", "Write the Blender extension");
+  const Command c = app.add_subcommand("build", "Writes the Blender extension, whole or for one scene");
   const std::string what = "What (one of them)", forms = "Forms, with --scene or --materials", where = "Where";
   c.add_flag("--all", options->all, "Every model").group(what);
   c.add_option("--model", options->models, "Only these models (repeat for several)").group(what);
@@ -239,7 +239,7 @@ void add_build_command(Command app) {
                "view angles")
       .group(what);
   c.add_option("--materials", options->materials,
-               "Only what a .blend uses, given in a file that the extension wrote (Write Materials)")
+               "Only what a .blend uses, as listed in a file that the extension wrote (Write Materials)")
       .group(what);
   add_number(c, "--error", options->error,
              {.low = 0, .high = 100, .unit = '%', .in_words = "percent from 0 to 100, as 5 or 5%"},
@@ -261,11 +261,10 @@ void add_build_command(Command app) {
              "Open Shading Language")
       .group(forms);
   c.add_flag("--osl-only", options->osl_only,
-             "Only for renders with Open Shading Language: leaves out the formula nodes that materials with an open\n"
-             "form use where it is off")
+             "Omits the formula nodes that materials with an open form use if Open Shading Language is off")
       .group(forms);
   c.add_flag("--explain", options->json,
-             "Prints as JSON which forms exist, what is left out and why, and what that saves")
+             "Prints as JSON which forms are available and chosen, with reasons, what is left out, and what that saves")
       .group(forms);
   c.add_option("--out", options->out, "Folder for the extension and its zip").group(where);
   c.add_option("--osl", options->osl,

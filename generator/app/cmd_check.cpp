@@ -20,9 +20,8 @@ void add_check_command(Command app) {
   auto o = std::make_shared<Options>();
   const Command cmd = app.add_subcommand(
       "check",
-      "Tests the properties that models declare (energy, reciprocity, isotropy, positive values, smoothness, limits; "
-      "a\n"
-      "declared failure must be visible), and those that every model must have (sampling according to the pdf, exact\n"
+      "Tests the properties that models declare (energy, reciprocity, isotropy, positive values, smoothness, limits;\n"
+      "also that declared failures occur), and those that every model must have (sampling according to the pdf, exact\n"
       "closures, small rounding errors in float and double), at default, random and extreme parameters. For all "
       "models\n"
       "it then prints a table of properties. A check that does not apply to a model is skipped, with the reason. Exit\n"

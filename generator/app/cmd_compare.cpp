@@ -41,9 +41,9 @@ void add_compare_command(Command app) {
   auto options = std::make_shared<Options>();
   const Command command = app.add_subcommand(
       "compare",
-      "Error of picture A against the reference picture B. With several A, rendered from different seeds, their mean\n"
-      "is judged, and --test tells error from noise.");
-  command.add_option("A... B", options->files, "One or more EXR files to judge, then the reference EXR")
+      "Error of picture A relative to the reference picture B. With several A, rendered from different seeds, the\n"
+      "error of their mean; --test then distinguishes error from noise.");
+  command.add_option("A... B", options->files, "One or more EXR files, then the reference EXR")
       .required()
       .expected(1, 1 << 16);
   command.add_flag("--json", options->json, "Print JSON instead of a table");

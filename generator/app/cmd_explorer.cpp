@@ -29,9 +29,9 @@ void add_explorer_command(Command app) {
   auto out = std::make_shared<std::string>();
   const Command cmd =
       app.add_subcommand("explorer",
-                         "Writes a page that draws all models in a browser, from their formulas: curves,\n"
-                         "albedo, lit spheres, differences. It needs WebGL 2, no server and no network.");
-  cmd.add_option("--out", *out, "Folder for the page; begin with its index.html").required();
+                         "Writes a page that shows all models in a browser, from their formulas: curves,\n"
+                         "albedo, lit spheres, differences. It needs WebGL 2, but no server or network.");
+  cmd.add_option("--out", *out, "Folder for the page; open its index.html").required();
   cmd.callback([out] { run(*out); });
 }
 

@@ -113,35 +113,33 @@ void add_measured_command(Command app) {
   auto o = std::make_shared<Options>();
   const Command cmd = app.add_subcommand(
       "measured",
-      "What a file with a measured BRDF holds, what it lacks, how much light it reflects, and every model fitted to "
-      "it,\n"
-      "the best first: the share of the light that the model sends in other directions, and its parameters.\n"
-      "FILE is one of the MERL database (.binary), of RGL (.bsdf), of UTIA (.bin), of ALTA as text (.alta, .dat),\n"
-      "or a table (.csv) with the columns\n"
-      "theta_i,phi_i,theta_o,phi_o in degrees (theta_i_rad,... in radians), or wi_x,wi_y,wi_z,wo_x,wo_y,wo_z, and "
-      "r,g,b in 1/sr, a row for every\n"
-      "combination of angles. Colours are linear Rec.709.");
+      "Reads a measured BRDF. Prints its format, its gaps and its albedo, and fits every model to it: a table of the\n"
+      "models, the best first, with parameters and error, the fraction of the light that is reflected in other\n"
+      "directions. FILE is from MERL (.binary), RGL (.bsdf), UTIA (.bin) or ALTA as text (.alta, .dat), or a table\n"
+      "(.csv) with the columns theta_i,phi_i,theta_o,phi_o in degrees (theta_i_rad,... in radians), or\n"
+      "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z, and r,g,b in 1/sr, with one row for each combination of angles. Colours are\n"
+      "linear Rec.709.");
   cmd.add_option("file", o->file, "The file").required();
-  cmd.add_flag("--json", o->json, "JSON");
+  cmd.add_flag("--json", o->json, "Print JSON");
   cmd.add_option("--models", o->models, "Names of the models to fit, separated by commas; all, or none")
       .delimiter(',')
       .capture_default_str();
   const Option lobes =
       add_number(cmd, "--lobes", o->lobes, {1, kMostLobes},
-                 "Sums of 1, 2, ... up to this number of lobes, each with its error. Models are fitted only if\n"
-                 "--models names them then");
+                 "Fit sums of 1, 2, ... up to this number of lobes, each with its error. Models are then fitted\n"
+                 "only if --models names them");
   cmd.add_option("--from", o->from,
-                 "Names of the models whose lobes may be in a sum, separated by commas; all that have some")
+                 "Names of the models that may be in a sum, separated by commas; by default all that can")
       .delimiter(',')
       .needs(lobes);
-  cmd.add_flag("--no-matte", o->no_matte,
-               "Fits are of the models alone, without light of a Lambert surface beside them");
+  cmd.add_flag("--no-matte", o->no_matte, "Fit the models only, without an additional Lambert surface");
   add_numbers(cmd, "--at", o->at, {0, 90, false, 0, "degrees from 0 to 89.9"},
-              "Views whose reflected light is said: degrees to the normal, separated by commas; 0, 15, 30, ... 89");
-  cmd.add_flag("--pairs", o->pairs,
-               "The BRDF in 1/sr for pairs of directions, and the pdf of the reference renderer's samples, instead.\n"
-               "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors)\n"
-               "stdout: CSV with header f_r,f_g,f_b,pdf")
+              "View angles for the albedo: degrees from the normal, separated by commas (default: 0, 15, 30, ... 89)");
+  cmd.add_flag(
+         "--pairs", o->pairs,
+         "Instead print the BRDF in 1/sr for pairs of directions, and the pdf of the reference renderer's samples.\n"
+         "stdin:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z (unit vectors)\n"
+         "stdout: CSV with header f_r,f_g,f_b,pdf")
       .excludes("--json")
       .excludes("--models")
       .excludes("--lobes")

@@ -64,9 +64,8 @@ void add_probe_command(Command app) {
   auto o = std::make_shared<Options>();
   const Command cmd = app.add_subcommand(
       "probe",
-      "Prints an OSL shader that shows f, pdf and samples of a model, computed by its recorded formulas. With --run "
-      "it\n"
-      "computes them itself: in double, in float, as recorded, and as recorded with OSL's arithmetic.\n"
+      "Prints an OSL shader that shows f, pdf and samples of a model, computed by its recorded formulas. With --run,\n"
+      "the tool computes them: in double, in float, as recorded, and as recorded with OSL's arithmetic.\n"
       "stdin of --run:  CSV with header wi_x,wi_y,wi_z,wo_x,wo_y,wo_z,u1,u2,u3 and the parameters (colours as\n"
       "                 name_r,name_g,name_b)\n"
       "stdout of --run: CSV of f_r,f_g,f_b,pdf,wi_x,wi_y,wi_z,weight_r,weight_g,weight_b,sample_pdf for each;\n"

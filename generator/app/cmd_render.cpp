@@ -83,7 +83,7 @@ void add_render_command(Command app) {
     double max_seconds = 0, scale = 1, exposure = 0;
   };
   auto options = std::make_shared<Options>();
-  const Command command = app.add_subcommand("render", "Render the reference picture of a scene");
+  const Command command = app.add_subcommand("render", "Renders the reference picture of a scene");
   command.add_option("SCENE", options->scene, "Scene file (.json)").required();
   command.add_option("--out", options->out, "EXR to write, with a variance layer; folders that are missing are made")
       .required();

@@ -11,8 +11,8 @@ namespace brdfc::app {
 void add_report_command(Command app) {
   const Command command = app.add_subcommand(
       "report",
-      "Compare the scenes rendered in the folders of DIR with their references, and write report.json, report.csv and\n"
-      "pictures to look at. script/report makes a page of them");
+      "Compares the rendered scenes in the folders of DIR with their references, and writes report.json, report.csv\n"
+      "and pictures. script/report makes a page of them");
   const auto folder = std::make_shared<std::string>();
   command.add_option("DIR", *folder, "A folder with one folder per scene, each with a runs.json").required();
   command.callback([folder] {

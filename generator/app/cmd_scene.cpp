@@ -13,7 +13,7 @@ void add_scene_command(Command app) {
   };
   auto options = std::make_shared<Options>();
   const Command command = app.add_subcommand(
-      "scene", "Write a scene with its meshes as .npy and its images as .exr, for a loader in another program");
+      "scene", "Writes a scene with its meshes as .npy and its images as .exr, to be loaded in another program");
   command.add_option("SCENE", options->scene, "Scene file (.json)").required();
   command.add_option("--out", options->out, "Folder to write scene.json to").required();
   command.callback([options] {

@@ -22,7 +22,7 @@ void add_stability_command(Command app) {
   const Command cmd = app.add_subcommand(
       "stability",
       "Compares, over all parameters that models accept, double precision with 113 bits, and float and recorded\n"
-      "programs with double; looks for invalid values (NaN, infinite, negative). Exit status 1 if a test fails.");
+      "programs with double. Searches for invalid values (NaN, infinite, negative). Exit status 1 if a test fails.");
   cmd.add_option("model", o->model, "Model, as in `brdfc list`; all models if omitted");
   add_number(cmd, "--points", o->hunt.points, {.low = 1}, "Points per model at which double is compared with 113 bits");
   add_number(cmd, "--calls", o->calls, {.low = 0},

@@ -60,7 +60,7 @@ NATIVE = DIFFUSE, GLOSSY = Form("Diffuse", "node"), Form("Glossy", "node")
 
 def representatives(extension, listed, nodes=False):
     """Forms that represent all others, by what they consist of; or Formula Nodes, which are made
-    otherwise (docs/nodes.md has what was found). `listed`: from `brdfc list --json`."""
+    otherwise (docs/nodes-measured.md: results). `listed`: from `brdfc list --json`."""
     models = {m["name"]: m for m in listed}
     forms = {}
 

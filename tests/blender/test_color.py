@@ -175,7 +175,7 @@ def test_a_substance_that_a_scenes_own_extension_lacks(
         assert api.get_parameters(material) != before
         return
     folded = ", ".join(name for name in values if name not in varies)
-    with pytest.raises(ValueError, match=f"was built for one scene: {folded} of .* can't be those"):
+    with pytest.raises(ValueError, match=f"was built for one scene: {folded} of .* can't be set"):
         api.set_substance(material, other)
     assert api.get_parameters(material) == before
 

@@ -259,7 +259,7 @@ def test_drivers_that_read_what_no_parameter_is_are_said(extension, convert, emp
     print(plan.line())
     assert plan.read == ("Base Color", "Roughness") and plan.readers == (empty.name, "Follower")
     said = f"Drivers of {empty.name}, Follower read its Base Color, Roughness"
-    assert f"{said}, and go on reading the replaced node" in plan.line()
+    assert f"{said}: they still read the replaced node" in plan.line()
     assert convert.apply([plan]) == 1
     assert [target.data_path for target in targets] == before
 

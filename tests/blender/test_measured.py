@@ -286,7 +286,7 @@ def test_nothing_to_coat(extension, empty):
     material = bpy.data.materials.new("Bare")
     extension.nodes.empty_tree(material)
     groups = len(bpy.data.node_groups)
-    with pytest.raises(ValueError, match="Nothing leads to the surface of material 'Bare'"):
+    with pytest.raises(ValueError, match="Nothing is connected to the surface of material 'Bare'"):
         extension.api.add_coat(material)
     assert len(bpy.data.node_groups) == groups and not material.node_tree.nodes
     if bpy.app.version < (5, 0):

@@ -521,7 +521,7 @@ def test_a_form_made_for_other_values_has_its_own_curve(
     off = area(np.abs(closures - f * wi[:, 2:]), plots._angles()[1:-1], axis=0).sum()
     off /= area(f * wi[:, 2:], plots._angles()[1:-1], axis=0).sum()
     assert legend.form == pytest.approx(off, rel=0.01) and 0.001 < off < 0.05
-    said = f"Dotted: render method Fitted. {100 * off:.2g} % of its light goes elsewhere"
+    said = f"Dotted: render method Fitted, error {100 * off:.2g} %"
     assert said in " ".join(log)
 
 

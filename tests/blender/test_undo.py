@@ -200,7 +200,7 @@ def test_details_say_what_the_panel_leaves_out(extension, start):
     form, _ = extension.model_nodes.manifest_entry(node)
     assert extension.ui.error_text(form).endswith(" %")
     lines = extension.ui.details(node, form)
-    assert any(line.startswith("Part of the reflected light") for line in lines)
+    assert any(line.startswith("Fraction of the reflected light") for line in lines)
     assert any("Closures of Cycles: " in line for line in lines)
     before = state()
     assert bpy.ops.brdfc.details(node=node.name) == {"FINISHED"}

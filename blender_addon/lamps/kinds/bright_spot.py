@@ -93,7 +93,7 @@ class BrightSpot(Kind):
             if turn is not None and abs(turn.determinant()) > 1e-9:
                 back = turn.inverted() @ Vector(direction)
             if back is None or back.length < 1e-9:
-                candidate.why = say("its vector or projection is not one that can be followed")
+                candidate.why = say("its vector or projection is not supported")
             else:
                 quaternion, w = slots.turned(back)
                 candidate.values = slots.numbers(
