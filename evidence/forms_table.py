@@ -152,7 +152,7 @@ def fits_over(tool):
 
 
 VIEWS = """\
-A row lists the share of the light that goes in other directions than the model says: the integral
+A row lists the share of the light that goes in other directions than in the model: the integral
 of the absolute difference of f cos, divided by the integral of f cos. It depends on the view. Half
 of all views are below the first figure, 95 % below the second, and all are at or below the third.
 Most models have their worst view within two degrees of the surface, where lobes are flat and wide
@@ -165,7 +165,7 @@ PAGES = {
         "What each form takes",
         """\
 Closures, error and cost with default parameters. The error is the part of the reflected light that
-goes in other directions than the model says, averaged over all views; it is 0 if a form is right,
+goes in other directions than in the model, averaged over all views; it is 0 if a form is right,
 or right on average. The cost is CPU time at equal samples in units of Blender's Glossy node,
 measured by `evidence/bench --forms`. `-` means that there is none.
 

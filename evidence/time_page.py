@@ -190,7 +190,7 @@ def text(names, found, diffuse, rows, days):
         "",
         "![Form's own error over its cost](time-error.png)",
         "",
-        "The part of the light that goes in other directions than the model says, at default",
+        "The part of the light that goes in other directions than in the model, at default",
         "parameters, over CPU time per sample.",
         "",
         *heading("Form", "models", "error, median", "worst", "cost, median", "worst"),
