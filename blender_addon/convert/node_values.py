@@ -3,6 +3,7 @@
 converted."""
 
 import functools
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -81,21 +82,51 @@ _OFTEN_ONE_COLOR = {"Alpha", "Base Color", "Color", "Emission Color", "Metallic"
 _WITHOUT_EFFECT = ("Weight", "Subsurface ", "Coat ", "Sheen ", "Thin Film ")
 
 
-#: Sockets of the coat of a Principled node that a conversion keeps.
-COAT_SOCKETS = ("Coat Weight", "Coat Roughness", "Coat Normal")
+#: Effects of a Principled node that lie over all others, and the sockets whose links a conversion
+#: keeps.
+UPPER_SOCKETS = {
+    "Sheen": ("Sheen Weight",),
+    "Coat": ("Coat Weight", "Coat Roughness", "Coat Normal"),
+}
 
 
-def effective_sockets(node, coated):
+UPPER_WEIGHTS = {f"{name} Weight" for name in UPPER_SOCKETS}
+
+
+@dataclass(frozen=True)
+class Upper:
+    """An effect of a Principled node that stays, over the models that replace the others."""
+
+    #: Of UPPER_SOCKETS.
+    name: str
+    #: The light that it leaves to what lies below, where it covers all: a polynomial as of
+    #: layer.rest().
+    rest: tuple
+    #: The largest channel of its tint.
+    top: float = 1.0
+
+    @property
+    def weight(self):
+        """The name of the socket of its weight."""
+        return f"{self.name} Weight"
+
+    @property
+    def roughness(self):
+        """The name of the socket of its roughness."""
+        return f"{self.name} Roughness"
+
+
+def effective_sockets(node, uppers):
     """The sockets of a convertible node that do something, or would if they had another value.
-    `coated`: whether it has a coat."""
+    `uppers`: its Uppers."""
+    of_uppers = {name for upper in uppers for name in UPPER_SOCKETS[upper.name]}
     return [
         socket
         for socket in node.inputs
         if socket.enabled
         and (
             socket.name in _OFF
-            or coated
-            and socket.name in COAT_SOCKETS
+            or socket.name in of_uppers
             or not socket.name.startswith(_WITHOUT_EFFECT)
         )
     ]
@@ -280,7 +311,7 @@ def given_of(node, inputs):
         given["beckmann"] = distribution == "BECKMANN"
         given["multiscatter"] = distribution == "MULTI_GGX"
     if kind == "principled":
-        check_off(inputs, but={"Coat Weight"})
+        check_off(inputs, but=UPPER_WEIGHTS)
         metallic = 0.5 if (known := inputs.mean("Metallic")) is None else known
         given["metallic"] = min(max(metallic, 0.0), 1.0)
         if is_plastic(inputs):
@@ -426,19 +457,32 @@ def _stretches(inputs, kind):
     return tuple((1 - a) ** 2 if a > 0 else 1 / (1 + a) ** 2 for a in found)
 
 
-def below_coat(inputs):
-    """The light that the coat of a Principled node leaves to what lies below, where it covers all:
-    as layer.below_coat(); empty without a coat."""
-    if "Coat Weight" not in inputs or inputs.constant("Coat Weight") == 0:
-        return ()
-    inputs.follows("Coat Weight")
+def uppers_of(inputs):
+    """The Uppers of a Principled node."""
+    found = []
+    for name, upper in (("Sheen", _sheen), ("Coat", _coat)):
+        weight = f"{name} Weight"
+        if weight in inputs and inputs.constant(weight) != 0:
+            inputs.follows(weight)  # says that something behind its link is animated
+            found.append(upper(inputs))
+    return tuple(found)
+
+
+def _coat(inputs):
     # No node gives a shader a colour.
     if inputs.value("Coat Tint", (1.0, 1.0, 1.0)) != (1, 1, 1):
         raise Refused(say("it has {what}", what=Sentence("Coat Tint")))
     ior = max(inputs.value("Coat IOR"), 1.0)
     roughnesses = _roughnesses(inputs, "Coat Roughness")
     f0 = ((ior - 1) / (ior + 1)) ** 2
-    return layer.below_coat(f0, roughnesses[0] if len(roughnesses) == 1 else None)
+    one = roughnesses[0] if len(roughnesses) == 1 else None
+    return Upper("Coat", layer.below_coat(f0, one))
+
+
+def _sheen(inputs):
+    top = max(*inputs.value("Sheen Tint"), 0.0)
+    roughness = min(max(inputs.value("Sheen Roughness"), 0.0), 1.0)
+    return Upper("Sheen", layer.below_sheen(roughness), top)
 
 
 def glows(inputs):

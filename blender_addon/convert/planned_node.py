@@ -12,7 +12,7 @@ from ..common.i18n import Sentence, in_percent, say
 from ..nearest import specular
 from ..packs import pack
 from ..trees import shader_values
-from .node_values import ANISOTROPY, COAT_SOCKETS, KINDS
+from .node_values import ANISOTROPY, KINDS, UPPER_SOCKETS
 from .seen_node import SeenNode
 
 #: Custom property of the nodes that were added along with it: the name of the group node.
@@ -81,9 +81,8 @@ class Plan(Part):
     #: Alpha.
     glows: bool = False
     transparent: bool = False
-    #: The light that the node's coat leaves to what lies below, where it covers all: as
-    #: layer.below_coat(). Empty without a coat.
-    below_coat: tuple = ()
+    #: The node_values.Uppers that lie over the models.
+    uppers: tuple = ()
     #: Whether the models need the node's tangent: that of its link or Cycles' default one, turned.
     anisotropic: bool = False
     #: Whether Filter Glossy blurs the node so that it shows, but not its model.
@@ -153,7 +152,8 @@ class Plan(Part):
         found |= {part.root[1] for part in parts if part.root}
         found |= {"Metallic"} if self.metal else set()
         found |= {"Alpha"} if self.transparent else set()
-        found |= set(COAT_SOCKETS) if self.below_coat else set()
+        for upper in self.uppers:
+            found |= set(UPPER_SOCKETS[upper.name])
         return found | ({"Emission Color", "Emission Strength"} if self.glows else set())
 
     @property

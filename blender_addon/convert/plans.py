@@ -33,9 +33,9 @@ from .node_values import (
     KINDS,
     KNOWN_SOCKETS,
     STAYING,
+    UPPER_WEIGHTS,
     Inputs,
     Refused,
-    below_coat,
     both_linked,
     check_off,
     color_of,
@@ -43,6 +43,7 @@ from .node_values import (
     given_of,
     glows,
     is_transparent,
+    uppers_of,
     varying_of,
 )
 from .planned_node import HELPS, Part, Plan
@@ -79,7 +80,7 @@ def _plan_clear(material, node, inputs):
     """The Plan for a Principled node that is smooth glass."""
     inputs.setting("mute")
     inputs.check_unknown(KNOWN_SOCKETS["principled"])
-    check_off(inputs, but={"Transmission Weight", "Coat Weight"})
+    check_off(inputs, but={"Transmission Weight", *UPPER_WEIGHTS})
     if inputs.value("Roughness") > 1e-3:
         raise Refused(say("the model of rough glass is darker under lamps"))
     if inputs.value("Specular IOR Level") != 0.5:
@@ -88,7 +89,7 @@ def _plan_clear(material, node, inputs):
         raise Refused(say("it has {what}", what=Sentence("Specular Tint")))
     # Such a node tints the transmitted light alone, at each surface by the root of its colour.
     more = {"glows": glows(inputs), "transparent": is_transparent(inputs)}
-    more["below_coat"] = below_coat(inputs)
+    more["uppers"] = uppers_of(inputs)
     if inputs.follows("Base Color"):
         more["root"] = ("refracted", "Base Color")
         return _glass_of(material, node, inputs, {}, {}, **more)
@@ -240,20 +241,21 @@ def _errors(found):
 _VIEWS = np.linspace(0.95, 0.25, 8)
 
 
-def _taken_by_coat(inputs, below):
-    """The light that a coat keeps from what lies below, at its smallest and its largest weight.
-    `below`: as Plan.below_coat."""
-    if not below:
-        return (0.0,)
-    weights = np.clip(inputs.ends("Coat Weight"), 0, 1)
-    rough = 0.0 if len(below[0]) == 1 else inputs.ends("Coat Roughness")[0]
-    whole = 1 - float(layer.rest_at(below, _VIEWS, rough).mean())
-    return tuple(dict.fromkeys(float(weight) * whole for weight in weights))
+def _taken_by(uppers, inputs):
+    """The light that a node's Uppers keep from what lies below, at their smallest and their largest
+    weights."""
+    left = np.ones(2)
+    for upper in uppers:
+        weights = np.clip(inputs.ends(upper.weight), 0, 1)
+        rough = 0.0 if len(upper.rest[0]) == 1 else inputs.ends(upper.roughness)[0]
+        whole = 1 - float(layer.rest_at(upper.rest, _VIEWS, rough).mean())
+        left *= np.clip(1 - weights * upper.top * whole, 0, 1)
+    return tuple(dict.fromkeys(float(1 - share) for share in left))
 
 
 def _errors_below(found, taken):
-    """The errors of what lies below a coat, which is Blender's own, as shares of the light of
-    both."""
+    """The errors of what lies below Uppers, which stay Blender's own, as shares of the light of
+    both. `taken`: as _taken_by() finds it."""
     pairs = []
     for light, error in found:
         for share in taken:
@@ -373,8 +375,8 @@ def _plan_node(material, node, inputs):
         part, fit = near()
         return plan(part, [fit], _errors(_found(fit)))
     more = {"glows": glows(inputs), "transparent": is_transparent(inputs)}
-    more["below_coat"] = below_coat(inputs)
-    taken = _taken_by_coat(inputs, more["below_coat"])
+    more["uppers"] = uppers_of(inputs)
+    taken = _taken_by(more["uppers"], inputs)
     single = None
     if not inputs.follows("Metallic"):
         part, fit = near()
@@ -455,7 +457,7 @@ def _of_group(made):
     if tree.is_embedded_data:
         return made
     others = tuple(m for m in model_nodes.users_of(tree) if m != made.material)
-    effective = effective_sockets(made.node, bool(made.below_coat))
+    effective = effective_sockets(made.node, made.uppers)
     kept = {name for socket in made.kept for name in _group_inputs(made.node.inputs[socket])}
     lost = [name for socket in effective for name in _group_inputs(socket) if name not in kept]
     return replace(made, others=others, unused=tuple(dict.fromkeys(lost)))

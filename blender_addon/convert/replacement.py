@@ -11,7 +11,7 @@ from ..groups import bump_correction, model_nodes, nodes
 from ..nearest import native_bsdf
 from ..packs import pack
 from ..trees import animation, shader_trees, shader_values
-from .node_values import ANISOTROPY, COAT_SOCKETS, KINDS, RATIO, has_own_animation
+from .node_values import ANISOTROPY, KINDS, RATIO, has_own_animation
 from .planned_node import HELPS
 
 #: Custom property of a group node: the name of the node that it replaces.
@@ -195,8 +195,8 @@ class Replacement:
             shader = self._sum(shader, left.outputs[0])
         if plan.metal:
             shader = self._mix("Metallic", shader, others[-1])
-        if plan.below_coat:
-            shader = self._coated(shader)
+        if plan.uppers:
+            shader = self._covered(shader)
         elif plan.glows:
             emission = self._helper("ShaderNodeEmission")
             for name, socket in (("Color", "Emission Color"), ("Strength", "Emission Strength")):
@@ -207,33 +207,62 @@ class Replacement:
             shader = self._mix("Alpha", clear.outputs[0], shader)
         return shader
 
-    def _coated(self, below):
-        """A shader under the coat of the node: the coat is that of a Principled node that has no
-        other effect but emission, which Cycles dims by the coat."""
-        coat = self._helper("ShaderNodeBsdfPrincipled")
+    def _covered(self, below):
+        """A shader under the Uppers of the node: a Principled node that has no other effect but
+        emission, which Cycles dims by them."""
+        uppers = self._helper("ShaderNodeBsdfPrincipled")
         # An IOR of 1 reflects nothing.
-        coat.inputs["Base Color"].default_value, coat.inputs["IOR"].default_value = (0, 0, 0, 1), 1
-        kept = ["Coat IOR", *(name for name in COAT_SOCKETS if name != "Coat Normal")]
-        kept += ["Emission Color", "Emission Strength"] if self._plan.glows else []
-        for name in kept:
-            self._give(coat.inputs[name], name)
-        for name in ("Normal", "Coat Normal"):
-            if source := self._source(name):
-                self._tree.links.new(source, coat.inputs[name])
-        normal = self._source("Coat Normal") or self._source("Normal")
-        rough = self._clamped("Coat Roughness") if len(self._plan.below_coat[0]) > 1 else None
-        rows = [self._polynomial(row, rough) for row in self._plan.below_coat]
-        rest = self._polynomial(rows, self._facing(normal))
-        weight = self._source("Coat Weight")
-        if weight is None:
-            weight = max(shader_values.constant(self._node.inputs["Coat Weight"]), 0.0)
+        uppers.inputs["Base Color"].default_value = 0, 0, 0, 1
+        uppers.inputs["IOR"].default_value = 1
+        shown = tuple(f"{upper.name} " for upper in self._plan.uppers)
+        shown += ("Emission ",) if self._plan.glows else ()
+        for socket in uppers.inputs:
+            if socket.name in ("Normal", "Coat Normal"):
+                if source := self._source(socket.name):
+                    self._tree.links.new(source, socket)
+            elif socket.name.startswith(shown):
+                self._give(socket, socket.name)
+        left = None
+        for upper in self._plan.uppers:
+            share = self._left_by(upper)
+            left = self._operation("ShaderNodeMath", "MULTIPLY", left, share) if left else share
+        dimmed = self._helper("ShaderNodeMixShader")
+        self._tree.links.new(left, dimmed.inputs[0])
+        self._tree.links.new(below, dimmed.inputs[2])
+        return self._sum(uppers.outputs[0], dimmed.outputs[0])
+
+    def _left_by(self, upper):
+        """Nodes for the share of light that an Upper leaves to what lies below."""
+        rough = self._clamped(upper.roughness) if len(upper.rest[0]) > 1 else None
+        rows = [self._polynomial(row, rough) for row in upper.rest]
+        rest = self._polynomial(rows, self._facing(self._normal_of(upper)))
         taken = self._operation("ShaderNodeMath", "SUBTRACT", 1.0, rest)
+        weight = self._source(upper.weight)
+        if weight is None:
+            weight = max(shader_values.constant(self._node.inputs[upper.weight]), 0.0)
         taken = self._operation("ShaderNodeMath", "MULTIPLY", taken, weight)
-        left = self._helper("ShaderNodeMixShader")
-        links = self._tree.links
-        links.new(self._operation("ShaderNodeMath", "SUBTRACT", 1.0, taken), left.inputs[0])
-        links.new(below, left.inputs[2])
-        return self._sum(coat.outputs[0], left.outputs[0])
+        if upper.top != 1:
+            taken = self._operation("ShaderNodeMath", "MULTIPLY", taken, upper.top)
+        share = self._operation("ShaderNodeMath", "SUBTRACT", 1.0, taken)
+        return self._operation("ShaderNodeMath", "MAXIMUM", share, 0.0)
+
+    def _normal_of(self, upper):
+        """The normal of an Upper: an output, or None for the surface's own. Cycles gives sheen that
+        of the coat as far as the coat covers it."""
+        normal, coat = self._source("Normal"), self._source("Coat Normal")
+        if coat is None or upper.name == "Coat":
+            return coat or normal
+        if "Coat" not in [other.name for other in self._plan.uppers]:
+            return normal
+        if self._source("Coat Weight"):
+            weight = self._clamped("Coat Weight")
+        else:
+            weight = shader_values.constant(self._node.inputs["Coat Weight"])
+            weight = min(max(weight, 0.0), 1.0)
+        normal = normal or self._helper("ShaderNodeNewGeometry").outputs["Normal"]
+        turn = self._operation("ShaderNodeVectorMath", "SUBTRACT", coat, normal)
+        turned = self._operation("ShaderNodeVectorMath", "MULTIPLY_ADD", turn, weight, normal)
+        return self._operation("ShaderNodeVectorMath", "NORMALIZE", turned)
 
     def _helper(self, kind):
         """A node that is added along with a group to replace the node."""

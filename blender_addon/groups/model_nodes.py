@@ -16,8 +16,11 @@ from ..packs.parameter_values import canonical, choice_label, equal_in_float32
 from ..trees import animation, shader_trees
 
 TAG = pack.TAG
-#: Key in the tag of a group that adapts to the scene: the form it takes where OSL runs.
+#: Key in the tag of a group that adapts to the scene: the form it takes where OSL runs. If that is
+#: Formula Nodes, only their room for lamps adapts.
 AUTO = "auto"
+#: Name of the form of Blender's own nodes.
+FORMULA_NODES = "nodes"
 
 
 def is_ours(node):
@@ -69,7 +72,14 @@ def identity(node):
 
 def is_automatic(node):
     """Whether a node adapts its form to the scene."""
-    return AUTO in node.node_tree[TAG]
+    tag = node.node_tree[TAG]
+    return AUTO in tag and not keeps_form(tag)
+
+
+def keeps_form(tag):
+    """Whether a group of Formula Nodes that adapts to the scene was asked for by name, by its
+    tag."""
+    return tag[AUTO] == FORMULA_NODES
 
 
 def _lacks_choice(node):
@@ -95,9 +105,10 @@ def has_stand_in(node):
 
 
 def content_group(group):
-    """The group that has the nodes of the form: an automatic group may contain another group."""
-    if AUTO in group[TAG] and group[TAG][AUTO] != group[TAG]["representation"]:
-        form = group[TAG]["representation"]
+    """The group that has the nodes of the form: a group that adapts to the scene may contain
+    another group."""
+    form = group[TAG]["representation"]
+    if AUTO in group[TAG] and (group[TAG][AUTO] != form or keeps_form(group[TAG])):
         inner = (n.node_tree for n in group.nodes if is_ours(n))
         return next((g for g in inner if g[TAG]["representation"] == form), group)
     return group

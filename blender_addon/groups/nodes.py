@@ -125,6 +125,8 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False, va
         if model.native_form and not with_osl.is_native:
             return _ensure_automatic(with_osl, albedo)
     form = model.resolve(representation, values)
+    if form.is_native and form.lamps and not baked:
+        return _ensure_automatic(form, albedo)
     if group := find_group(form, albedo):
         _clear_fake_users(group)
         return group
@@ -138,15 +140,17 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False, va
 
 
 def _ensure_automatic(with_osl, albedo):
-    """The group that adapts to the scene; `with_osl`: its form where OSL runs."""
-    native = with_osl.model.native_form
+    """The group that adapts to the scene; `with_osl`: its form where OSL runs, or that of Blender's
+    own nodes, so that only its room for lamps adapts."""
+    native = with_osl if with_osl.is_native else with_osl.model.native_form
     lacks_osl = device.lacks_osl(lamps.current_scene())
     for form in (with_osl, native):
         if group := find_group(form, albedo, with_osl):
             _clear_fake_users(group)
             adapt_to_scene(group, lacks_osl)
             return group
-    with _new_group("auto", with_osl, albedo) as group:
+    name = with_osl.name if with_osl.is_native else AUTO
+    with _new_group(name, with_osl, albedo) as group:
         tag = group[TAG]
         tag[AUTO], tag["with_albedo"] = with_osl.name, albedo and with_osl.has_albedo_script
         tag["native_only"] = json.dumps(native.only)
@@ -255,16 +259,18 @@ def adapt_to_scene(group, lacks_osl, room_needed=lamps.room_needed):
     A group that has room for more lamps keeps it: lamps are often hidden and shown again.
     """
     tag = group[TAG]
+    keeps_form = model_nodes.keeps_form(tag)
+    is_native = keeps_form or tag["representation"] != tag[AUTO]
     # Handlers call this at each change of the scene, and computing the version takes a hash.
-    if group.nodes and (tag["representation"] == tag[AUTO]) != lacks_osl:
-        if not lacks_osl or ROOM not in tag:
+    if group.nodes and is_native == (lacks_osl or keeps_form):
+        if not is_native or ROOM not in tag:
             return False
         if room_needed().joined(_room_of(tag)) == _room_of(tag):
             return False
     if not model_nodes.is_current(group):
         return False
     model = pack.model(tag["model"])
-    wanted = model.native_form if lacks_osl else model.forms[tag[AUTO]]
+    wanted = model.forms[tag[AUTO]] if keeps_form or not lacks_osl else model.native_form
     if wanted is None:
         return False
     _change_form(group, wanted, room_needed)
@@ -283,7 +289,7 @@ def _change_form(group, form, room_needed):
     with_osl = form.model.forms[tag[AUTO]]
     try:
         group[TAG].pop(ROOM, None)
-        if form == with_osl:
+        if not form.is_native:
             _fill(group, form, tag["with_albedo"])
         else:
             room = room_needed() if form.lamps else lamps.WHOLE

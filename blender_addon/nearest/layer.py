@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from . import native_bsdf
+from .sheen_albedo import ALBEDOS, COSINES, ROUGHNESSES
 
 #: View cosines and roughnesses to which the polynomials are fitted. Nearer to the horizon a surface
 #: fills few pixels.
@@ -47,11 +48,21 @@ def below_coat(f0, roughness=None):
     return _of_roughness(taken, coat, roughness)
 
 
+def below_sheen(roughness):
+    """The same for the sheen of a Principled node, of one roughness."""
+    row = [np.interp(roughness, ROUGHNESSES, column) for column in ALBEDOS.T]
+    return _polynomial(1 - np.interp(_COSINES, COSINES, row)[None], np.array([roughness]), 0)
+
+
 def _of_roughness(taken, native, roughness):
     """The polynomial for 1 - taken(native) at a roughness, or at all."""
     roughnesses = _ROUGHNESSES if roughness is None else np.array([roughness])
     left = 1 - np.stack([taken(replace(native, roughness=r)) for r in roughnesses])
-    degree = _DEGREE_ROUGHNESS if roughness is None else 0
+    return _polynomial(left, roughnesses, _DEGREE_ROUGHNESS if roughness is None else 0)
+
+
+def _polynomial(left, roughnesses, degree):
+    """The polynomial of this degree in the roughness for `left`, of roughnesses and _COSINES."""
     of_view = (1 - _COSINES)[:, None] ** np.arange(_DEGREE + 1)
     of_width = roughnesses[:, None] ** np.arange(degree + 1)
     terms = of_view[None, :, :, None] * of_width[:, None, None, :]

@@ -735,11 +735,17 @@ def test_what_no_animation_can_move_stays_and_is_said(
     assert extension.api.convert_materials([plan]) == 0 and node.outputs[0].is_linked
 
 
-def test_a_coat_stays_blenders_own(extension, convert):
-    """Also where its weight, roughness and normal are linked or animated, and over what glows. What
-    was added is not converted again, and goes with the model."""
+def test_coat_and_sheen_stay_blenders_own(extension, convert):
+    """Also where their weight, roughness and normal are linked or animated, and over what glows.
+    What was added is not converted again, and goes with the model."""
     material, node = material_of(
-        "principled", Coat_Weight=0.7, Coat_IOR=1.8, Metallic=0.5, Emission_Strength=0.2
+        "principled",
+        Coat_Weight=0.7,
+        Coat_IOR=1.8,
+        Metallic=0.5,
+        Emission_Strength=0.2,
+        Sheen_Weight=0.3,
+        Sheen_Tint=(0.2, 0.5, 0.4),
     )
     keyed(node.inputs["Coat Weight"])
     for socket in ("Coat Roughness", "Coat Normal"):
@@ -753,6 +759,8 @@ def test_a_coat_stays_blenders_own(extension, convert):
     coats = [n for n in material.node_tree.nodes if n.bl_idname == node.bl_idname and n != node]
     (coat,) = coats
     assert coat.inputs["Coat IOR"].default_value == pytest.approx(1.8)
+    assert coat.inputs["Sheen Weight"].default_value == pytest.approx(0.3)
+    assert coat.inputs["Sheen Tint"].default_value[1] == pytest.approx(0.5)
     assert coat.inputs["Base Color"].default_value[:3] == (0, 0, 0)
     assert coat.inputs["IOR"].default_value == 1 and coat.outputs[0].is_linked
     for socket in ("Coat Weight", "Coat Roughness", "Coat Normal", "Emission Strength"):
@@ -952,6 +960,7 @@ def test_links_that_no_model_follows_are_named(extension, convert, inputs, socke
 LINKED = [
     ("principled", {"Metallic": 0.5}, "IOR"),
     ("principled", {"Coat_Weight": 0.5}, "Coat IOR"),
+    ("principled", {"Sheen_Weight": 0.5}, "Sheen Roughness"),
 ]
 
 

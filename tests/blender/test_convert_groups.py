@@ -167,7 +167,7 @@ def test_constants_have_to_agree_in_all_materials(extension, convert):
     group.inputs["IOR"].default_value = 1.5
     group.inputs["Coat Weight"].default_value = 0.5
     plan = only(convert.plan([car]))
-    assert not plan.refusal and plan.below_coat and "Coat Weight" not in plan.unused
+    assert not plan.refusal and plan.uppers and "Coat Weight" not in plan.unused
     group.inputs["Coat Weight"].default_value = 0.0
     # A second node of the same material counts as well; what nothing shows does not.
     bike.node_tree.links.clear()

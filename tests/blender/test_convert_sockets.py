@@ -16,7 +16,10 @@ STATES = {
     "glass": ("glass", {"Roughness": 0.0}),
     "plastic": ("principled", {"Roughness": 0.4}),
     "polished plastic": ("principled", {"Roughness": 0.0}),
-    "coated": ("principled", {"Roughness": 0.4, "Coat_Weight": 0.7, "Coat_Roughness": 0.2}),
+    "covered": (
+        "principled",
+        {"Roughness": 0.4, "Coat_Weight": 0.7, "Coat_Roughness": 0.2, "Sheen_Weight": 0.6},
+    ),
     "metal": ("principled", {"Roughness": 0.5, "Metallic": 1.0, "Anisotropic": 0.7}),
     "matte": ("principled", {"IOR": 1.0, "Anisotropic": 0.5}),
     "clear": ("principled", {"Roughness": 0.0, "Transmission_Weight": 1.0, "Base_Color": (1,) * 3}),
@@ -30,7 +33,7 @@ VECTORS = ((0.3, -0.8, 0.5),)
 EFFECTS = ("Subsurface ", "Coat ", "Sheen ", "Thin Film ")
 #: States in which most inputs count, so most materials differ after conversion. They are shown
 #: without Open Shading Language, which would compile each of them; that doubled the test's time.
-MANY = ("plastic", "polished plastic", "coated", "metal", "glowing")
+MANY = ("plastic", "polished plastic", "covered", "metal", "glowing")
 #: Pixels across a ball with its margin, samples of each, and balls in a row of a picture.
 PIXELS, SAMPLES, ROW = 16, 64, 12
 
@@ -77,8 +80,8 @@ def cases(state):
 
     for index, socket in enumerate(add("as it is").inputs):
         is_effect = socket.name.startswith(EFFECTS)
-        if state == "coated":
-            counts = socket.name.startswith("Coat ")
+        if state == "covered":
+            counts = socket.name.startswith(("Coat ", "Sheen "))
         else:
             counts = state == "plastic" or not is_effect
         if not socket.enabled or not counts:

@@ -395,12 +395,8 @@ def room_of(extension, material):
     its nodes tell."""
     (node,) = extension.model_nodes.group_nodes(material)
     tag = node.node_tree[extension.model_nodes.TAG]
-    (inner,) = [
-        n.node_tree
-        for n in node.node_tree.nodes
-        if extension.model_nodes.is_ours(n)
-        and n.node_tree[extension.model_nodes.TAG]["representation"] == "nodes"
-    ]
+    inner = extension.model_nodes.content_group(node.node_tree)
+    assert inner[extension.model_nodes.TAG]["representation"] == "nodes"
 
     def inside(tree, name):
         groups = [n for n in tree.nodes if n.bl_idname == "ShaderNodeGroup"]
@@ -416,12 +412,13 @@ def room_of(extension, material):
     return slots, cones
 
 
-def test_nodes_have_room_for_the_lamps_of_the_scene(extension, new_file):
+@pytest.mark.parametrize("form", ["auto", "nodes"])
+def test_nodes_have_room_for_the_lamps_of_the_scene(extension, new_file, form):
     """Empty slots cost time before the first sample. A lamp without a size that has no slot in the
     nodes would be dark, so the picture equals that of nodes with room for all lamps."""
     few_samples(new_file, 16, 24)
     add_camera(new_file)
-    material = extension.api.new_material("cook_torrance")
+    material = extension.api.new_material("cook_torrance", form)
     add_sphere(new_file, material)
     update(new_file)
     pictures, rooms = [render(new_file)], [room_of(extension, material)]
@@ -434,7 +431,7 @@ def test_nodes_have_room_for_the_lamps_of_the_scene(extension, new_file):
     hidden = render(new_file)
     assert room_of(extension, material) == (8, 1)
     np.testing.assert_allclose(hidden, pictures[3], rtol=1e-5, atol=1e-6)
-    extension.api.switch_representation(material, "nodes")
+    extension.api.switch_representation(material, {"auto": "nodes", "nodes": "auto"}[form])
     last.hide_render = False
     for picture in reversed(pictures):
         np.testing.assert_allclose(render(new_file), picture, rtol=1e-5, atol=1e-6)
@@ -442,12 +439,13 @@ def test_nodes_have_room_for_the_lamps_of_the_scene(extension, new_file):
             bpy.data.objects.remove(others[-1])
 
 
-def test_room_for_the_cones_of_an_area_lamp(extension, new_file):
+@pytest.mark.parametrize("form", ["auto", "nodes"])
+def test_room_for_the_cones_of_an_area_lamp(extension, new_file, form):
     """Nodes compute the model four times for each lamp only where a lamp is flat; and what was
     needed once stays."""
     few_samples(new_file, 16, 24)
     add_camera(new_file)
-    material = extension.api.new_material("cook_torrance")
+    material = extension.api.new_material("cook_torrance", form)
     add_sphere(new_file, material)
     update(new_file)
     assert room_of(extension, material) == (2, 1)
@@ -490,11 +488,12 @@ def test_room_for_a_lamp_that_is_shown_later(extension, new_file):
     assert render(new_file).mean() > 1.05 * before.mean()
 
 
-def test_undo_of_a_lamp(extension, new_file):
+@pytest.mark.parametrize("form", ["auto", "nodes"])
+def test_undo_of_a_lamp(extension, new_file, form):
     """Groups that were made again after an undo step was recorded are not those of the step."""
     few_samples(new_file, 4)
     add_camera(new_file)
-    material = extension.api.new_material("cook_torrance")
+    material = extension.api.new_material("cook_torrance", form)
     add_sphere(new_file, material)
     name, pictures = material.name, []
     for x in (None, 2.0, -2.0):

@@ -107,7 +107,7 @@ def test_the_warning_is_of_what_is_converted_with_the_setting(extension, convert
     empty.cycles.shading_system = False
     assert ask(plans, empty) is None
     empty.cycles.shading_system = True
-    node.inputs["Coat Weight"].default_value = 0.5
+    node.inputs["Transmission Weight"].default_value = 0.5
     assert ask(extension.api.plan_conversion([material]), empty) is None
 
 

@@ -258,7 +258,7 @@ def test_a_world_that_can_not_be_followed(extension, empty):
     node.projection = "MIRROR_BALL"
     messages = found(extension, material, empty)
     assert list(messages) == ["not_aimed"]
-    assert "Sky, bright spot 1" in messages["not_aimed"] and "followed" in messages["not_aimed"]
+    assert "Sky, bright spot 1: its vector or projection" in messages["not_aimed"]
 
 
 @pytest.mark.slow

@@ -54,7 +54,8 @@ def described(tree, seen=None):
 
 def formulas(material, extension):
     (node,) = extension.model_nodes.group_nodes(material)
-    (inner,) = (n.node_tree for n in node.node_tree.nodes if n.label == "Formulas")
+    content = extension.model_nodes.content_group(node.node_tree)
+    (inner,) = (n.node_tree for n in content.nodes if n.label == "Formulas")
     return inner
 
 

@@ -811,7 +811,7 @@ def test_the_panel_names_what_it_cannot_know(extension, panel, plots, empty, mon
     panel.draw_plots(layout, material)
     assert "picture 14.4" in layout.log
     assert any("Glossy, roughness" in line for line in layout.log)
-    assert any("Principled. 1" in line for line in layout.log)
+    assert any("Principled, error 1" in line for line in layout.log)
     assert any("Its roughness 0.58, metallic 1.00, IOR 1.50" in line for line in layout.log)
     assert not any("default" in line for line in layout.log)
     value = node.id_data.nodes.new("ShaderNodeValue")
