@@ -103,7 +103,7 @@ def test_what_materials_add_to_a_file(extension, empty, tmp_path):
         sizes.append(Path(file).stat().st_size)
     first, again, ward, factors = np.diff(sizes)
     print("KB:", *(np.diff(sizes) // 1000))
-    assert again < 5e3 and ward < 300e3 and first < 600e3 and factors < 800e3
+    assert again < 5e3 and ward < 260e3 and first < 480e3 and factors < 800e3
 
 
 def test_parts_that_an_append_brings_again_are_merged(extension, empty, tmp_path):
