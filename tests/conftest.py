@@ -29,6 +29,18 @@ def few_of_fixture():
     return few_of
 
 
+@pytest.fixture(scope="session")
+def third_of(request):
+    """third_of(cases): with --third a third of the cases, another at each commit; without it, and
+    in evidence/run, all. For cases that are measured together; those that are separate tests are
+    marked `long`."""
+    text = request.config.getoption("third")
+    if EVERY_CASE or text is None:
+        return list
+    # Apart from the choice among long tests: each part of such a test has its turn.
+    return lambda cases: third(list(cases), f"{text} cases")
+
+
 def pytest_addoption(parser):
     parser.addoption(
         "--few",

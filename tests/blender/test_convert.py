@@ -554,7 +554,7 @@ def tinted_glass(kind, color):
 def test_tinted_glass_is_the_same_block_by_block(extension, convert, empty, kind, color, osl):
     """A Glass node tints what it reflects and refracts; a Principled node what it refracts."""
     material, node = tinted_glass(kind, color)
-    ball_before_a_sky(empty, material, 48, 256, osl)
+    ball_before_a_sky(empty, material, 48, 64, osl)
 
     def blocks():
         """Means of 8 x 8 pixels."""

@@ -86,32 +86,41 @@ def test_scenes_load_under_configurations_of_aces(extension_zip, tmp_path, confi
         "lights": [],
         "environment": {"image": "sky.exr", "strength": 1},
     }
+    # The configuration's own working space, and another one, which Blender can select from 5.0 on.
+    own, other = "ACEScg", "Linear Rec.2020"
     (tmp_path / "s.json").write_text(json.dumps(content), encoding="utf-8")
+    for space in (own, other):
+        named = content | {"working_space": space, "environment": {"color": [0.2, 0.6, 0.1]}}
+        (tmp_path / f"{space}.json").write_text(json.dumps(named), encoding="utf-8")
 
-    def drive(source, out):
+    def drive(*pairs):
+        """Renders scenes, (file, picture), in one Blender."""
+        jobs = [
+            {"scene": str(tmp_path / source), "out": str(tmp_path / out), "timed": False}
+            for source, out in pairs
+        ]
+        (tmp_path / "jobs.json").write_text(json.dumps(jobs), encoding="utf-8")
         return subprocess.run(
-            [sys.executable, DRIVER, "--extension", extension_zip, "--scene", tmp_path / source]
-            + ["--out", tmp_path / out],
+            [sys.executable, DRIVER, "--extension", extension_zip]
+            + ["--jobs", tmp_path / "jobs.json"],
             capture_output=True,
             text=True,
             env=os.environ | {"OCIO": f"ocio://{config}"},
         )
 
-    for out in ("a.exr", "a.png"):
-        done = drive("s.json", out)
-        assert done.returncode == 0, done.stderr[-2000:]
-    found = open_image_io().ImageBuf(str(tmp_path / "a.exr")).get_pixels()[..., :3]
-    np.testing.assert_allclose(found, np.broadcast_to([0.2, 0.6, 0.1], found.shape), rtol=1e-4)
-    # The configuration's own working space, and another one, which Blender can select from 5.0 on.
-    chooses = hasattr(bpy.data, "colorspace")
-    for space, taken in (("ACEScg", True), ("Linear Rec.2020", chooses)):
-        named = content | {"working_space": space, "environment": {"color": [0.2, 0.6, 0.1]}}
-        (tmp_path / "named.json").write_text(json.dumps(named), encoding="utf-8")
-        done = drive("named.json", "b.exr")
-        if not taken:
-            assert done.returncode == 2
-            assert "expected 'ACEScg', the working space of Blender" in done.stderr
-            continue
-        assert done.returncode == 0, done.stderr[-2000:]
-        found = open_image_io().ImageBuf(str(tmp_path / "b.exr")).get_pixels()[..., :3]
+    def assert_unchanged(out):
+        found = open_image_io().ImageBuf(str(tmp_path / out)).get_pixels()[..., :3]
         np.testing.assert_allclose(found, np.broadcast_to([0.2, 0.6, 0.1], found.shape), rtol=1e-4)
+
+    done = drive(("s.json", "a.exr"), ("s.json", "a.png"), (f"{own}.json", "own.exr"))
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert (tmp_path / "a.png").is_file()
+    assert_unchanged("a.exr")
+    assert_unchanged("own.exr")
+    done = drive((f"{other}.json", "other.exr"))
+    if hasattr(bpy.data, "colorspace"):
+        assert done.returncode == 0, done.stderr[-2000:]
+        assert_unchanged("other.exr")
+    else:
+        assert done.returncode == 2
+        assert "expected 'ACEScg', the working space of Blender" in done.stderr

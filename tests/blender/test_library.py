@@ -109,17 +109,18 @@ def test_a_model_of_which_nothing_is_made_is_there_with_its_defaults(
 
 
 @pytest.mark.slow
-def test_what_needs_open_shading_language_says_so(extension, library, empty):
+def test_what_needs_open_shading_language_says_so(extension, library, empty, third_of):
     empty.cycles.shading_system = False
-    found = set()
-    for entry in library.entries():
+    entries, found = third_of(library.entries()), set()
+    for entry in entries:
         warned = extension.api.warnings(library.make(extension.api, entry), empty)
         needs = "osl_off" in {warning.code for warning in warned}
         assert needs == ("Needs Open Shading Language" in library.description(entry)), entry.name
         found |= {entry.name} if needs else set()
     # Rays through a surface, and a choice of a model that has refraction as another.
     rough_glass = {"Ground Glass", "Hoarfrost"}
-    assert found == {"Frosted Glass", "Sea Glass", "Traffic Sign White", *rough_glass}
+    all_of_these = {"Frosted Glass", "Sea Glass", "Traffic Sign White", *rough_glass}
+    assert found == all_of_these & {entry.name for entry in entries}
 
 
 def test_every_picture_is_of_the_material_that_is_listed(library, monkeypatch):

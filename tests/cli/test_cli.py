@@ -580,6 +580,7 @@ def test_base_prints_what_it_carries_and_leaves():
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("fits_made_once")
 def test_fit_prints_its_error_by_view_and_its_closures():
     result = run("fit", "phong", "e=20")
     table = rows(result)
@@ -645,6 +646,7 @@ def test_a_lamp_without_a_size_is_named_beside_the_form(tmp_path, radius, said):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("fits_made_once")
 def test_a_scene_of_camera_rays_alone_has_tables_of_the_views_that_occur(tmp_path):
     content = scene(
         camera={

@@ -12,10 +12,11 @@ import json
 import re
 import shlex
 import subprocess
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support import BROWSERS, CHROMIUM, LISTED, ROOT, TOOL
+from support import BROWSERS, CHROMIUM, LISTED, MODELS, ROOT, TOOL
 
 pytestmark = pytest.mark.slow
 
@@ -47,7 +48,7 @@ for (const {model, values} of CASES)
     const slot = {model, values: {...defaultsOf(model), ...values}};
     return Array.from(renderer.evaluate(slot, LIGHTS, VIEWS));
   }));
-for (const model of Object.keys(BRDFC.models))
+for (const model of MODELS)
   found.pages[model] = attempt(model, () => {
     readAddress(`#m=${model}`);
     rebuild();
@@ -196,12 +197,25 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def found(folder, tmp_path_factory):
+def tried(request):
+    """Models that this run tries, of tests marked `long`: drawn, and cases with their formulas."""
+    items = [i for i in request.session.items if i.path == request.path and hasattr(i, "callspec")]
+    drawn, asked = (
+        {i.callspec.params["model"] for i in items if i.originalname == test.__name__}
+        for test in (test_every_model_is_drawn, test_values_are_those_of_the_tool)
+    )
+    cases = [case for case in CASES if case[0] in asked]
+    return SimpleNamespace(drawn=[m for m in MODELS if m in drawn], cases=cases)
+
+
+@pytest.fixture(scope="module")
+def found(folder, tried, tmp_path_factory):
     """What the script at the page's end found."""
     if CHROMIUM is None:
         pytest.skip(f"none of {', '.join(BROWSERS)} is installed: the explorer was not tested")
     given = {
-        "CASES": [{"model": m, "values": values_of(m, text)} for m, text in CASES],
+        "CASES": [{"model": m, "values": values_of(m, text)} for m, text in tried.cases],
+        "MODELS": tried.drawn,
         "PAIRS": list(PAIRS),
         "FURNACE": FURNACE,
         "LIGHTS": LIGHTS.tolist(),
@@ -221,6 +235,7 @@ def found(folder, tmp_path_factory):
     result = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.S)
     assert result, done.stderr[-2000:]
     out = json.loads(result[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
+    out["values"] = dict(zip(tried.cases, out["values"], strict=True))
     out["console"] = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
     return out
 
@@ -229,11 +244,11 @@ def test_nothing_is_reported(found):
     assert found["errors"] == [] and found["console"] == []
 
 
-def in_double_precision():
+def in_double_precision(cases):
     """f and pdf of each case, an array (directions, 4); one run of the tool for all cases of a
     model that have the same choices."""
     groups, found = {}, {}
-    for model, text in CASES:
+    for model, text in cases:
         schema = next(m for m in LISTED if m["name"] == model)
         values = {p["name"]: p["default"] for p in schema["parameters"]} | values_of(model, text)
         choices = tuple(f"{k}={v}" for k, v in values.items() if isinstance(v, str))
@@ -260,38 +275,34 @@ def in_double_precision():
     return found
 
 
-def test_values_are_those_of_the_tool(found):
-    wrong, truths = [], in_double_precision()
-    for (model, text), values in zip(CASES, found["values"], strict=True):
-        truth = truths[model, text]
-        got = np.array(values, dtype=float).reshape(-1, 4)
+@pytest.mark.long
+@pytest.mark.parametrize("model", MODELS)
+def test_values_are_those_of_the_tool(found, model):
+    wrong, truths = [], in_double_precision([case for case in CASES if case[0] == model])
+    assert truths
+    for (_, text), truth in truths.items():
+        got = np.array(found["values"][model, text], dtype=float).reshape(-1, 4)
         error = np.abs(got - truth) / np.maximum(np.abs(truth), 1e-6 * np.abs(truth).max() + 1e-30)
         at = np.unravel_index(np.argmax(np.nan_to_num(error, nan=np.inf)), error.shape)
         if not error[at] <= STIFF.get((model, text), TOLERANCE):
             wrong.append((model, text, LIGHTS[at[0]], VIEWS[at[0]], got[at[0]], truth[at[0]]))
     assert not wrong
+
+
+def test_stiff_cases_are_among_those_of_the_models():
     assert set(STIFF) <= set(CASES)
 
 
-@pytest.mark.parametrize("model", [m["name"] for m in LISTED])
+@pytest.mark.long
+@pytest.mark.parametrize("model", MODELS)
 def test_every_model_is_drawn(found, model):
+    """With the albedo of the tool."""
     page = found["pages"][model]
     assert page["error"] == "" and page["curves"] == 2
     for view in ("lamp", "sky"):
         total, least = page["lit"][view]
         assert np.isfinite(total) and total > 0 and least >= 0, view
-
-
-def test_the_difference_of_two_is_that_of_their_formulas(found):
-    for (address, truth), got in zip(PAIRS.items(), found["differences"], strict=True):
-        for where in ("here", "everywhere"):
-            assert got[where] == pytest.approx(truth, rel=1e-4, abs=1e-6), address
-        assert f"{100 * truth:g} %" in got["text"]
-
-
-@pytest.mark.parametrize("model", [m["name"] for m in LISTED])
-def test_the_albedo_is_that_of_the_tool(found, model):
-    got = np.array(found["pages"][model]["albedo"]).reshape(-1, 4)[:, :3]
+    got = np.array(page["albedo"]).reshape(-1, 4)[:, :3]
     angles = np.minimum(np.arange(len(got)) / (len(got) - 1) * np.pi / 2, 1.569)
     chosen = [15, 40]
     lines = ["cos_theta_o", *(repr(float(np.cos(angles[i]))) for i in chosen)]
@@ -301,6 +312,13 @@ def test_the_albedo_is_that_of_the_tool(found, model):
     assert done.returncode == 0, done.stderr
     truth = np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1, ndmin=2)
     assert got[chosen] == pytest.approx(truth[:, 1:4], abs=0.01)
+
+
+def test_the_difference_of_two_is_that_of_their_formulas(found):
+    for (address, truth), got in zip(PAIRS.items(), found["differences"], strict=True):
+        for where in ("here", "everywhere"):
+            assert got[where] == pytest.approx(truth, rel=1e-4, abs=1e-6), address
+        assert f"{100 * truth:g} %" in got["text"]
 
 
 def test_the_sky_is_as_bright_by_any_strategy(found):

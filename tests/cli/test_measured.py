@@ -2,6 +2,7 @@
 """Measured BRDFs: files of every format, made from functions, are read as what they were made from;
 what is wrong in one is said in a line, and so is what data lack."""
 
+import io
 import json
 import re
 import struct
@@ -29,11 +30,13 @@ COLUMNS = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z"
 
 def eval_pairs(arguments, wi, wo):
     """What a command of the tool prints for pairs of directions."""
-    rows = "\n".join(",".join(f"{x:.17g}" for x in (*a, *b)) for a, b in zip(wi, wo, strict=True))
+    # All rows at once: Python took longer to print them than the tool to answer.
+    rows = np.hstack([wi, wo])
+    text = ("%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n" * len(rows)) % tuple(rows.ravel().tolist())
     command = [TOOL, *arguments]
-    done = subprocess.run(command, input=f"{COLUMNS}\n{rows}\n", capture_output=True, text=True)
+    done = subprocess.run(command, input=f"{COLUMNS}\n{text}", capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    return np.array([line.split(",") for line in done.stdout.splitlines()[1:]], float)
+    return np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1, ndmin=2)
 
 
 def pairs(file, wi, wo):

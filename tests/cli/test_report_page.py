@@ -314,13 +314,20 @@ def test_more_forms_than_colours_differ_in_their_marks():
     assert len(marks) == 8
 
 
+@pytest.fixture(scope="module")
+def two_scenes(tmp_path_factory):
+    """The folder of a report, and its page."""
+    folder = tmp_path_factory.mktemp("report")
+    made(folder, "a-scene-with-a-long-name", "phong")
+    made(folder, "other", "ward")
+    return folder, reported(folder)
+
+
 @pytest.mark.skipif(CHROMIUM is None, reason="chromium is missing: the page is seen by nobody")
 @pytest.mark.parametrize("width", [WIDE, NARROW])
-def test_the_page_in_a_browser(tmp_path, width):
-    made(tmp_path, "a-scene-with-a-long-name", "phong")
-    made(tmp_path, "other", "ward")
-    text = reported(tmp_path)
-    page = tmp_path / "index.html"
+def test_the_page_in_a_browser(tmp_path, two_scenes, width):
+    folder, text = two_scenes
+    page = folder / f"{width}.html"
     assert "2 scenes, 16 pictures" in text
     page.write_text(text.replace("</body>", PROBE + "</body>"), encoding="utf-8")
     command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom"]
