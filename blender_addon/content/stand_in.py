@@ -123,6 +123,43 @@ def _phong_material(w, given, normal):
     return w.sum([matte, glossy(highlight, given("es")), reflection])
 
 
+#: Wave numbers in 1 / um of light in three channels, and how much of them a channel sees.
+_WAVES, _SPREAD = (1.65, 1.84, 2.2), 0.1
+
+
+def _thin_film(w, given, normal):
+    """Metal in the colour that light has which comes straight at film and base, but passes the film
+    at the viewer's angle: R_12, R_23 and, as C, r_12 r_23 with the film's phase give
+    (R_12 + R_23 + 2 C) / (1 + R_12 R_23 + 2 C)."""
+    viewer = w.node("ShaderNodeNewGeometry").outputs["Incoming"]
+    cosine = w.vector("DOT_PRODUCT", normal, viewer, output="Value")
+    n2, n, k = given("film_ior"), *(w.combine(*(given(f"{x}_{c}") for c in "rgb")) for x in "nk")
+    n2_squared = w.math("MULTIPLY", n2, n2)
+    q2 = w.math("SQRT", w.math("MULTIPLY_ADD", cosine, cosine, w.math("SUBTRACT", n2_squared, 1.0)))
+    turn = w.math("MULTIPLY", w.math("MULTIPLY", given("thickness"), q2), 4e-3 * math.pi)
+    phase = w.vector("SCALE", _WAVES, scale=turn)
+    seen = w.math("MULTIPLY", turn, _SPREAD)
+    seen = w.math("EXPONENT", w.math("MULTIPLY", w.math("MULTIPLY", seen, seen), -0.5))
+    above = w.math("DIVIDE", w.math("SUBTRACT", 1.0, n2), w.math("ADD", 1.0, n2))
+    R12 = w.math("MULTIPLY", above, above)
+    # r_23 = (a - 2 i n2 k) / b, with b = |n2 + n + i k|^2.
+    film, k_squared = w.combine(n2, n2, n2), w.vector("MULTIPLY", k, k)
+    b = w.vector("ADD", film, n)
+    b = w.vector("MULTIPLY_ADD", b, b, k_squared)
+    a = w.vector("SUBTRACT", w.vector("MULTIPLY", film, film), w.vector("MULTIPLY", n, n))
+    a = w.vector("DIVIDE", w.vector("SUBTRACT", a, k_squared), b)
+    i = w.vector("DIVIDE", w.vector("SCALE", k, scale=w.math("MULTIPLY", n2, 2.0)), b)
+    R23 = w.vector("MULTIPLY_ADD", a, a, w.vector("MULTIPLY", i, i))
+    shifted = w.vector("MULTIPLY", i, w.vector("SINE", phase))
+    C = w.vector("MULTIPLY_ADD", a, w.vector("COSINE", phase), shifted)
+    C = w.vector("SCALE", C, scale=w.math("MULTIPLY", w.math("MULTIPLY", above, seen), 2.0))
+    both = w.vector("MULTIPLY_ADD", R23, w.combine(R12, R12, R12), (1.0, 1.0, 1.0))
+    high = w.vector("ADD", w.vector("ADD", R23, w.combine(R12, R12, R12)), C)
+    color = w.vector("DIVIDE", high, w.vector("ADD", both, C))
+    roughness = w.math("SQRT", w.mean(given("ax"), given("ay")))
+    return w.metal("ggx", color, (1.0, 1.0, 1.0), roughness, normal)
+
+
 #: Blender's nodes by model: for glass and ideal mirrors, which have no twin, and for models with
 #: two widths, whose twins have those of the defaults.
 _NODES = {
@@ -131,6 +168,7 @@ _NODES = {
     "rough_glass": _glass,
     "fresnel_conductor": _polished_metal,
     "microfacet": _metal,
+    "thin_film": _thin_film,
     "ward": _ward,
     "ashikhmin_shirley": _ashikhmin_shirley,
     "phong_material": _phong_material,

@@ -43,14 +43,14 @@ _PRINCIPLED_SLOTS = {
 #: Numbers that Cycles keeps at a time without Open Shading Language.
 _STACK = 255
 #: How many of them a material with one model takes besides those of lamps (lamps.Budget) and of the
-#: model's formula: `numbers` in the manifest, of which at most _OF_FORMULA are not constants, and
-#: those of linked sockets, each with a part of what is computed from it. With GLOG_v=3 in its
-#: environment, Blender prints the sum. 22 models were measured to take at most 192 under four area
-#: lamps and 243 under eight, `factors` 234 and 247. With all sockets linked, `radziszewski_alda`
-#: takes 253 under eight, and `factors`, which has 22 colours, 242 under one. `microfacet`, whose
-#: base has Metallic nodes with sockets of their own, takes 239 under two, and with linked sockets
-#: _METALS more are counted.
-_OF_MATERIAL, _OF_FORMULA, _LINKED, _METALS = 85, 60, 1.2, 45
+#: model's formula: `numbers` in the manifest, and those of linked sockets, each with a part of what
+#: is computed from it. With GLOG_v=3 in its environment, Blender prints the sum. 22 models were
+#: measured to take at most 192 under four area lamps and 243 under eight, `factors` 234 and 247.
+#: With all sockets linked, `radziszewski_alda` takes 253 under eight, and `factors`, which has 22
+#: colours, 242 under one. `microfacet`, whose base has Metallic nodes with sockets of their own,
+#: takes 239 under two, and with linked sockets _METALS more are counted. `thin_film`, whose formula
+#: keeps most, has room for five lamps, or three if all of its sockets are linked.
+_OF_MATERIAL, _LINKED, _METALS = 85, 1.2, 45
 #: How many lamps there is room for beside several models as Formula Nodes. Cycles computes what
 #: their parts have in common first, for all lamps, and keeps it. Two models were measured to take
 #: 201 under four area lamps (233 if one is `factors`), three 185 under three, four and five 179
@@ -137,7 +137,7 @@ def of_material(material):
                 linked = sum(
                     3 if s.type in ("VECTOR", "RGBA") else 1 for s in node.inputs if s.is_linked
                 )
-                own = min(made.form.get("numbers", 0), _OF_FORMULA) + _LINKED * linked
+                own = made.form.get("numbers", 0) + _LINKED * linked
                 if linked and pack.model(model_nodes.identity(node).model).may_be_closure:
                     own += _METALS
                 numbers, is_linked = max(numbers, own), is_linked or linked > 0

@@ -172,7 +172,7 @@ STACK = 255
 
 
 #: The models that keep the most numbers.
-LARGEST = {"factors", "microfacet", "phong_material", "radziszewski_alda"}
+LARGEST = {"factors", "microfacet", "phong_material", "radziszewski_alda", "thin_film"}
 
 
 @pytest.mark.slow
@@ -183,6 +183,7 @@ LARGEST = {"factors", "microfacet", "phong_material", "radziszewski_alda"}
         ("largest", 8, False),
         ("factors", 8, True),
         ("microfacet", 8, True),
+        ("thin_film", 8, True),
         pytest.param("all", 8, False, marks=pytest.mark.long),
         pytest.param("all", 4, False, marks=pytest.mark.long),
         pytest.param("all but factors", 8, True, marks=pytest.mark.long),

@@ -137,6 +137,10 @@ def test_a_twin_stands_in_where_shaders_do_not_run(extension, balls):
 #: Models with two widths, of which each is narrow in one material and wide in another.
 TWO_WIDTHS = {
     "microfacet": ({"ax": 0.03, "ay": 0.03}, {"ax": 0.5, "ay": 0.5, "tint": (0.5, 0.8, 1.0)}),
+    "thin_film": (
+        {"ax": 0.05, "ay": 0.05},
+        {"ax": 0.4, "ay": 0.4, "thickness": 150, "film_ior": 2.2},
+    ),
     "ward": ({"ax": 0.05, "ay": 0.05}, {"ax": 0.4, "ay": 0.4}),
     "ashikhmin_shirley": (
         {"nu": 500.0, "nv": 500.0, "rd": (0.5, 0.1, 0.1)},

@@ -869,6 +869,111 @@ def micro_albedo(p, cos_o):
     return [found * more] * 3
 
 
+# ---- Belcour and Barla, with the model's Gaussians ---------------------------------------------
+
+#: Centres and width in 1 / um, and weights by working space and channel.
+FILM_CENTRES = [mp.mpf("1.9761") + mp.mpf("0.1110") * j for j in range(-3, 4)]
+FILM_WIDTH = mp.mpf("0.0710")
+FILM_WEIGHTS = {
+    "rec709": (
+        ("1.2946", "0.2709", "-0.3731", "-0.2209", "-0.0675", "0.0401", "0.0559"),
+        ("-0.1315", "0.4122", "0.6014", "0.1877", "0.0344", "-0.0587", "-0.0455"),
+        ("-0.0074", "-0.0609", "-0.0569", "0.0019", "0.2030", "0.6306", "0.2897"),
+    ),
+    "rec2020": (
+        ("0.7686", "0.3031", "-0.0385", "-0.0768", "-0.0223", "0.0332", "0.0327"),
+        ("-0.0316", "0.3970", "0.5265", "0.1575", "0.0293", "-0.0440", "-0.0347"),
+        ("0.0030", "-0.0138", "-0.0041", "0.0146", "0.1837", "0.5602", "0.2564"),
+    ),
+    "acescg": (
+        ("0.7487", "0.3032", "-0.0273", "-0.0717", "-0.0201", "0.0346", "0.0326"),
+        ("-0.0298", "0.3959", "0.5241", "0.1566", "0.0295", "-0.0425", "-0.0338"),
+        ("0.0059", "-0.0022", "0.0087", "0.0175", "0.1790", "0.5429", "0.2482"),
+    ),
+}
+
+
+def film_fresnel(p, c):
+    """The paper's series, its eq. 7, as 2 (C_0 + sum C_m cos) of both polarisations; from m = 3 on
+    with the ratio of Gaussians' transforms."""
+    n2, sin2 = mp.mpf(p["film_ior"]), 1 - c**2
+    q2 = mp.sqrt(n2**2 - sin2)
+    turn = 4 * mp.pi * q2 * mp.mpf(p["thickness"]) / 1000
+    spaces = FILM_WEIGHTS[p["space"]]
+
+    def transform(weights, m):
+        decay = mp.exp(-((m * turn * FILM_WIDTH) ** 2) / 2)
+        phases = [mp.expj(m * turn * v) for v in FILM_CENTRES]
+        return decay * sum(mp.mpf(w) * x for w, x in zip(weights, phases, strict=True))
+
+    ones = [mp.expj(turn * v) * mp.exp(-5 * (turn * FILM_WIDTH) ** 2 / 2) for v in FILM_CENTRES]
+    ratios = [ones[0], (ones[1] + ones[3]) / 2, (ones[4] + ones[6]) / 2]
+    out = []
+    for channel, (weights, ratio) in enumerate(zip(spaces, ratios, strict=True)):
+        name = "rgb"[channel]
+        n3 = mp.mpc(p[f"n_{name}"], p[f"k_{name}"])
+        q3 = mp.sqrt(n3**2 - sin2)
+        total = 0
+        for e1, e2, e3 in ((1, 1, 1), (1, n2**2, n3**2)):
+            a, b, g = c / e1, q2 / e2, q3 / e3
+            r12, r23 = (a - b) / (a + b), (b - g) / (b + g)
+            big1, big2, through = r12**2, abs(r23) ** 2, 1 - r12**2
+            star = through**2 * big2 / (1 - big1 * big2)
+            rho = -r12 * r23
+            first, second = transform(weights, 1), transform(weights, 2)
+            series = rho * first + rho**2 * second / (1 - rho * ratio)
+            total += big1 + star + 2 * (star - through) * series.real
+        out.append(min(max(total / 2, 0), 1))
+    return out
+
+
+def film_f(p, wi, wo):
+    ki, ko, h, oh = half(wi, wo)
+    p = {**p, "distribution": "ggx"}
+    shape = micro_d(p, h) / (1 + micro_lambda(p, ki) + micro_lambda(p, ko)) / (4 * ki[2] * ko[2])
+    return [c * shape for c in film_fresnel(p, oh)]
+
+
+def film_pdf(p, wi, wo):
+    return micro_pdf({**p, "distribution": "ggx", "masking": "smith_correlated"}, wi, wo)
+
+
+def film_albedo(p, cos_o):
+    """View in the x-z plane; integrated over half vectors. F is interpolated between Chebyshev's
+    nodes, as it is smooth in the cosine."""
+    with mp.workdps(16):
+        degree = 60
+        nodes = [0.5 - 0.5 * math.cos(math.pi * k / degree) for k in range(degree + 1)]
+        curve = [[float(c) for c in film_fresnel(p, mp.mpf(max(x, 1e-9)))] for x in nodes]
+    signs = [(-1) ** k * (0.5 if k in (0, degree) else 1.0) for k in range(degree + 1)]
+
+    def reflectance(oh, channel):
+        parts = [s / (oh - x or 1e-18) for s, x in zip(signs, nodes, strict=True)]
+        return sum(w * f[channel] for w, f in zip(parts, curve, strict=True)) / sum(parts)
+
+    def at(w):
+        return (math.sqrt(1 + ((p["ax"] * w[0]) ** 2 + (p["ay"] * w[1]) ** 2) / w[2] ** 2) - 1) / 2
+
+    wo = (math.sqrt(1 - cos_o**2), 0, cos_o)
+
+    def light(channel):
+        def one(p, hn, oh, ni, no, phi):
+            sin = math.sqrt(1 - hn**2)
+            h = (sin * math.cos(phi), sin * math.sin(phi), hn)
+            slope2 = ((h[0] / p["ax"]) ** 2 + (h[1] / p["ay"]) ** 2) / hn**2
+            d = 1 / (1 + slope2) ** 2 / (math.pi * p["ax"] * p["ay"] * hn**4)
+            wi = [2 * oh * a - b for a, b in zip(h, wo, strict=True)]
+            return d / (1 + at(wi) + at(wo)) * oh / no * reflectance(oh, channel)
+
+        return half_albedo(one, lambda p: min(p["ax"], p["ay"]))(p, cos_o)
+
+    return [light(channel) for channel in range(3)]
+
+
+#: Water or plastic below the film.
+FILM_CLEAR = {"n_r": 1.33, "n_g": 1.33, "n_b": 1.33, "k_r": 0, "k_g": 0, "k_b": 0}
+
+
 # ---- Ward, in three normalisations -------------------------------------------------------------
 
 
@@ -1906,6 +2011,45 @@ MODELS = {
             {"f0": (1, 1, 1), "distribution": "multiscatter_ggx", "ax": 0.7, "ay": 0.7},
         ],
         cosines=[1, 0.5, 0.1],
+    ),
+    "thin_film": dict(
+        f=film_f,
+        pdf=film_pdf,
+        albedo=film_albedo,
+        defaults={
+            "thickness": 300,
+            "film_ior": 1.5,
+            "ax": 0.1,
+            "ay": 0.1,
+            "n_r": 2.74,
+            "n_g": 2.51,
+            "n_b": 2.24,
+            "k_r": 3.84,
+            "k_g": 3.4,
+            "k_b": 3.01,
+            "space": "rec709",
+        },
+        cases=[
+            {},
+            {"thickness": 120, "film_ior": 2.4, "ax": 0.02, "ay": 0.5},
+            {
+                "thickness": 550,
+                "film_ior": 1.33,
+                "space": "rec2020",
+                "ax": 1,
+                "ay": 1,
+                **FILM_CLEAR,
+            },
+            {"thickness": 0, "film_ior": 3, "space": "acescg", "n_r": 0.2, "k_g": 0},
+            {"thickness": 900, "film_ior": 1, "n_r": 100, "k_r": 0, "n_g": 0.001},
+            {"thickness": 268, "film_ior": 2.3, "ax": 0.4, "ay": 0.4, **FILM_CLEAR},
+            {"thickness": 10000, "film_ior": 5, "ax": 1e-4, "ay": 1e-4},
+        ],
+        albedo_cases=[
+            {"ax": 0.5, "ay": 0.5},
+            {"thickness": 550, "film_ior": 1.33, "ax": 0.3, "ay": 1, "space": "rec2020"},
+        ],
+        cosines=[1, 0.4],
     ),
     "rough_glass": dict(
         f=glass_f,

@@ -233,8 +233,9 @@ TEST_P(RecordedFormula, ExecutedInFloatEqualsTheFloatInstantiation) {
       compare(out.at("p")[0], p);
       compare(out.at("w")[0], brdf->sample(wo, un).weight.r);
     }
-    // The exponent, 50 here, may amplify the rounding of a constant.
-    EXPECT_LT(worst, 2e-5) << model.info().name;
+    // The exponent, 50 here, may amplify the rounding of a constant. thin_film's reflectance is a difference from 1,
+    // which is 0.005 in some of these cases.
+    EXPECT_LT(worst, model.info().name == "thin_film" ? 2e-4 : 2e-5) << model.info().name;
   }
 }
 
