@@ -88,8 +88,6 @@ UPPER_SOCKETS = {
     "Sheen": ("Sheen Weight",),
     "Coat": ("Coat Weight", "Coat Roughness", "Coat Normal"),
 }
-
-
 UPPER_WEIGHTS = {f"{name} Weight" for name in UPPER_SOCKETS}
 
 

@@ -5,6 +5,7 @@
 
 #include <complex>
 
+#include "core/data_dir.h"
 #include "measure/probes.h"
 #include "model/optical.h"
 #include "model/spectrum.h"
@@ -84,7 +85,7 @@ constexpr std::array<std::array<Complex, 3>, 5> kBases = {
      {Complex(1.33), Complex(1.33), Complex(1.33)}}};
 
 TEST(ThinFilm, IsNearTheSumOverWavelengths) {
-  const reference::ColorConfig config("data/color/config.ocio");
+  const reference::ColorConfig config(data_path("data/color/config.ocio"));
   for (const auto& [space, name] : kSpaces) {
     const reference::ColorConfig converted = config.with_working_space(name);
     std::vector<double> off;
@@ -117,7 +118,7 @@ TEST(ThinFilm, IsNearTheSumOverWavelengths) {
 /// The error of one n and k for each channel, in place of those of all wavelengths. It is larger for metals that are
 /// coloured themselves; gold is outside Rec.709.
 TEST(ThinFilm, IsNearTheSumOverTheSpectrumOfAMetal) {
-  const reference::ColorConfig rec709 = reference::ColorConfig("data/color/config.ocio");
+  const reference::ColorConfig rec709 = reference::ColorConfig(data_path("data/color/config.ocio"));
   for (const char* name : {"titanium", "iron", "chromium", "aluminium", "silver", "copper", "gold"}) {
     const Substance metal = find_substance(name, ".");
     const ParamValues values =
