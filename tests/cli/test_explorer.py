@@ -24,11 +24,20 @@ FLAGS = (
     "--headless=new --no-sandbox --disable-dev-shm-usage --no-first-run --enable-logging=stderr "
     "--use-angle=swiftshader --enable-unsafe-swiftshader --dump-dom"
 ).split()
+#: A clear base of thin_film.
+CLEAR = "n_r={0} n_g={0} n_b={0} k_r=0 k_g=0 k_b=0"
 #: Relative errors of f and pdf in single precision; and larger ones, of extreme parameters.
 TOLERANCE = 1e-4
 STIFF = {
     ("coupled", "fresnel=dielectric r0=0.9999999"): 0.3,
     ("lossless", "kernel=exponential n=10000"): 1e-3,
+    # What films hardly reflect is a difference from 1: of some, of antireflective ones, of none.
+    (
+        "thin_film",
+        f"thickness=268 film_ior=2.3 {CLEAR.format('1.33')} ax=0.3 ay=0.3",
+    ): 1e-3,
+    ("thin_film", f"thickness=100 film_ior=1.2247 {CLEAR.format('1.5')} ax=0.0001 ay=1"): 1e-3,
+    ("thin_film", f"film_ior=1 {CLEAR.format('1')}"): 0.5,
     # Narrower than single precision resolves: only that no value is invalid or too large.
     ("radziszewski_alda", "proportion=custom n_theta=100000000 n_phi=0"): 1,
 }
