@@ -17,12 +17,13 @@
 // colours; R is from 0 to 1; and at d = 0 it is Fresnel's reflectance of the base, as it is for n_2 = 1.
 //
 // Spectrum. Only exp(2 pi i D / lambda) depends on the wavelength: each channel has its own n_3 + i k_3, as in
-// fresnel_conductor, and n_2 is constant. So z^m is averaged by the Fourier transform of the channel's sensitivity
-// over 1 / lambda, at m D (paper, sec. 4). The sensitivity of a channel of the working space is the CIE 1931 observer
-// times D65, as elsewhere (model/spectrum.h), here as a sum of five Gaussians that all channels share, with weights for
-// each of three working spaces. Five were fitted to the table's transforms: these differ by at most 0.005 for D up to
-// 3 um and 0.02 for any. The paper has four Gaussians for X, Y and Z under a constant illuminant, which are converted
-// to RGB afterwards.
+// fresnel_conductor, and n_2 is constant. So z^m is averaged by the Fourier transform of the channel's sensitivity over
+// 1 / lambda, at m D (paper, sec. 4). The sensitivity of a channel of the working space is the CIE 1931 observer times
+// D65, as elsewhere (model/spectrum.h), here as a sum of seven Gaussians that all channels share, with weights for each
+// of three working spaces. They are evenly spaced and equally wide, so that all transforms need two angles and one
+// exponential. They were fitted to the table's transforms: in Rec.709 these differ by at most 0.006 for D up to 3 um
+// and 0.03 for any. The paper has four Gaussians for X, Y and Z under a constant illuminant, which are converted to RGB
+// afterwards.
 //
 // The series. The paper takes m to 2 or 3, and lets n_2 tend to 1 below d = 30 nm, since the remainder is large where
 // colours overlap. Here m = 1 and 2 are as above, and the sum of all others is geometric,
