@@ -458,8 +458,7 @@ def _stretches(inputs, kind):
 def uppers_of(inputs):
     """The Uppers of a Principled node."""
     found = []
-    for name, upper in (("Sheen", _sheen), ("Coat", _coat)):
-        weight = f"{name} Weight"
+    for weight, upper in (("Sheen Weight", _sheen), ("Coat Weight", _coat)):
         if weight in inputs and inputs.constant(weight) != 0:
             inputs.follows(weight)  # says that something behind its link is animated
             found.append(upper(inputs))

@@ -61,10 +61,11 @@ def _of_roughness(taken, native, roughness):
     return _polynomial(left, roughnesses, _DEGREE_ROUGHNESS if roughness is None else 0)
 
 
-def _polynomial(left, roughnesses, degree):
-    """The polynomial of this degree in the roughness for `left`, of roughnesses and _COSINES."""
+def _polynomial(left, widths, degree):
+    """The polynomial of this degree in a number for `left`, a row for each of `widths`, the values
+    of that number, and a column for each of _COSINES."""
     of_view = (1 - _COSINES)[:, None] ** np.arange(_DEGREE + 1)
-    of_width = roughnesses[:, None] ** np.arange(degree + 1)
+    of_width = widths[:, None] ** np.arange(degree + 1)
     terms = of_view[None, :, :, None] * of_width[:, None, None, :]
     terms = terms.reshape(left.size, -1)
     # Relative errors of the base's light, except where there is hardly any.
@@ -86,12 +87,7 @@ def rest_of_share(native, at, least):
     native = replace(native, color=(1.0, 1.0, 1.0), tint=(max(native.tint),))
     nodes = [at(native, share) for share in shares]
     left = 1 - np.stack([native_bsdf.view_terms(node, _VIEWS).taken for node in nodes])
-    of_view = (1 - _COSINES)[:, None] ** np.arange(_DEGREE + 1)
-    of_share = shares[:, None] ** np.arange(_DEGREE_SHARE + 1)
-    terms = (of_view[None, :, :, None] * of_share[:, None, None, :]).reshape(left.size, -1)
-    weight = 1 / (left.ravel() + 0.1)
-    found = np.linalg.lstsq(terms * weight[:, None], left.ravel() * weight, rcond=None)[0]
-    return tuple(tuple(float(c) for c in row) for row in found.reshape(_DEGREE + 1, -1))
+    return _polynomial(left, shares, _DEGREE_SHARE)
 
 
 @functools.cache

@@ -59,6 +59,12 @@ template <class T> struct Facets {
     return T(1) / (T(4) * (maximum(wo.z, T(0)) + hidden(wo)));
   }
 
+  /// The density of directions reflected about sampled normals.
+  T reflected_pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    const HalfVector<T> k(wi, wo);
+    return select(above(wi, wo), D(k.h) * visible(k.h.z, k.oh, wo), T(0));
+  }
+
   /// A normal that Smith's ggx shows to w.
   Vec3<T> sample_caps(const Vec3<T>& w, const T& u1, const T& u2) const {
     const Vec3<T> k = normalize(Vec3<T>{ax * w.x, ay * w.y, w.z});

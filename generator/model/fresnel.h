@@ -9,18 +9,24 @@
 
 namespace brdfc::inline model {
 
-/// Reflectance of a conductor n + i k. With u + i v = sqrt((n + i k)^2 - sin^2),
-///   R_s = ((u - c)^2 + v^2) / ((u + c)^2 + v^2),  R_p = R_s ((u c - s^2)^2 + v^2 c^2) / ((u c + s^2)^2 + v^2 c^2),
-/// which are quotients of sums of squares. The larger of u^2 and v^2 is computed from the root, the smaller from
-/// u v = n k.
-template <class T> T fresnel_conductor(const T& cosTheta, const T& sin2, const T& n, const T& k) {
+/// u, v^2 and |u + i v|^2 of u + i v = sqrt((n + i k)^2 - sin^2). The larger of u^2 and v^2 is computed from the
+/// root, the smaller from u v = n k.
+template <class T> struct ConductorRoot { T u, v2, modulus; };
+template <class T> ConductorRoot<T> conductor_root(const T& sin2, const T& n, const T& k) {
   const T nk = n * k;
   const T real = named("real", (n - k) * (n + k) - sin2);
   const T modulus = named("modulus", sqrt(real * real + T(4) * nk * nk));
   const T large = named("large", (modulus + abs(real)) / T(2));
   const T small = named("small", nk * nk / maximum(large, tiny<T>()));
   const T u = named("u_root", sqrt(select(real > T(0), large, small)));
-  const T v2 = named("v2", select(real > T(0), small, large));
+  return {u, named("v2", select(real > T(0), small, large)), modulus};
+}
+
+/// Reflectance of a conductor n + i k. With u + i v = sqrt((n + i k)^2 - sin^2),
+///   R_s = ((u - c)^2 + v^2) / ((u + c)^2 + v^2),  R_p = R_s ((u c - s^2)^2 + v^2 c^2) / ((u c + s^2)^2 + v^2 c^2),
+/// which are quotients of sums of squares.
+template <class T> T fresnel_conductor(const T& cosTheta, const T& sin2, const T& n, const T& k) {
+  const auto [u, v2, modulus] = conductor_root(sin2, n, k);
   const T Rs = named("R_s", (sqr(u - cosTheta) + v2) / (sqr(u + cosTheta) + v2));
   const T uc = named("uc", u * cosTheta), vc2 = named("vc2", v2 * cosTheta * cosTheta);
   const T Rp = named("R_p", Rs * ((sqr(uc - sin2) + vc2) / (sqr(uc + sin2) + vc2)));

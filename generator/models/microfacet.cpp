@@ -144,10 +144,7 @@ template <class T> struct Microfacet {
     return F(k.one_minus_oh) * compensation(wo) * select(above(wi, wo), surface().D(k.h) * shape(k, wi, wo), T(0));
   }
 
-  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
-    const HalfVector<T> k(wi, wo);
-    return select(above(wi, wo), surface().D(k.h) * surface().visible(k.h.z, k.oh, wo), T(0));
-  }
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const { return surface().reflected_pdf(wi, wo); }
 
   Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
     const Vec3<T> h = surface().sample_normal(wo, u).h;

@@ -48,6 +48,7 @@
 // counts where F is below some 1e-3, for a film that matches a clear base, and is less than a picture shows.
 #include "model/base_terms.h"
 #include "model/facets.h"
+#include "model/fresnel.h"
 
 namespace brdfc {
 namespace {
@@ -217,18 +218,12 @@ template <class T> struct ThinFilm {
     const T q2sq = maximum(step + c * c, tiny<T>()), q2 = named("q_2", sqrt(q2sq));
     const Averages averaged = averages(q2);
 
-    // q_3 as in fresnel_conductor(): the larger of u^2 and v^2 from the root, the smaller from u v = n k.
     struct Channel {
       T u, v, modulus, e3;
     };
     const auto channel = [&](const T& n, const T& k) {
-      const T nk = n * k, real = named("real", (n - k) * (n + k) - s2);
-      const T modulus = named("modulus", sqrt(real * real + T(4) * nk * nk));
-      const T large = named("large", (modulus + abs(real)) / T(2));
-      const T small = named("small", nk * nk / maximum(large, tiny<T>()));
-      const auto is_clear = real > T(0);
-      return Channel{named("u_root", sqrt(select(is_clear, large, small))),
-                     named("v_root", sqrt(select(is_clear, small, large))), modulus, n * n + k * k};
+      const ConductorRoot<T> q3 = conductor_root(s2, n, k);
+      return Channel{q3.u, named("v_root", sqrt(q3.v2)), q3.modulus, n * n + k * k};
     };
     const Channel r = channel(n_r, k_r), g = channel(n_g, k_g), b = channel(n_b, k_b);
     const Rgb<T> u = {r.u, g.u, b.u}, v = {r.v, g.v, b.v}, modulus = {r.modulus, g.modulus, b.modulus};
@@ -250,10 +245,7 @@ template <class T> struct ThinFilm {
     return F(k.oh, k.one_minus_oh) * select(above(wi, wo), surface().D(k.h) * shape(wi, wo), T(0));
   }
 
-  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
-    const HalfVector<T> k(wi, wo);
-    return select(above(wi, wo), surface().D(k.h) * surface().visible(k.h.z, k.oh, wo), T(0));
-  }
+  T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const { return surface().reflected_pdf(wi, wo); }
 
   Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
     const Vec3<T> h = surface().sample_normal(wo, u).h;
