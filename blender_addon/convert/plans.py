@@ -28,22 +28,20 @@ from ..packs.parameter_values import canonical
 from ..trees import animation, shader_trees
 from .filter_glossy import is_filtered
 from .instances import Instances
+from .kept_effects import TRANSMISSION, effective_sockets, subsurface_of, transmits, uppers_of
 from .node_values import (
     ANISOTROPY,
     KINDS,
     KNOWN_SOCKETS,
     STAYING,
-    UPPER_WEIGHTS,
     Inputs,
     Refused,
     both_linked,
     check_off,
     color_of,
-    effective_sockets,
     given_of,
     glows,
     is_transparent,
-    uppers_of,
     varying_of,
 )
 from .planned_node import HELPS, Part, Plan
@@ -73,14 +71,15 @@ def _plan_glass(material, node, inputs):
 def _is_clear(inputs):
     """Whether a Principled node transmits all light that enters it, as glass does."""
     name = "Transmission Weight"
-    return name in inputs and inputs.constant(name) == 1 and inputs.constant("Metallic") == 0
+    known = inputs.constant(name) if name in inputs else None
+    return known is not None and known >= 1 and inputs.constant("Metallic") == 0
 
 
 def _plan_clear(material, node, inputs):
     """The Plan for a Principled node that is smooth glass."""
     inputs.setting("mute")
     inputs.check_unknown(KNOWN_SOCKETS["principled"])
-    check_off(inputs, but={"Transmission Weight", *UPPER_WEIGHTS})
+    check_off(inputs)
     if inputs.value("Roughness") > 1e-3:
         raise Refused(say("the model of rough glass is darker under lamps"))
     if inputs.value("Specular IOR Level") != 0.5:
@@ -264,6 +263,19 @@ def _errors_below(found, taken):
     return _errors(pairs)
 
 
+def _beside(found, shares):
+    """The (light, error) of each colour and roughness, where these shares of it give way to
+    Blender's own glass, which loses no light."""
+    return [
+        [
+            ((1 - s) * light + s, (1 - s) * light * error / max((1 - s) * light + s, 1e-9))
+            for light, error in of_color
+            for s in dict.fromkeys(shares)
+        ]
+        for of_color in found
+    ]
+
+
 def _found(fit):
     """(light, error) of all colours and roughnesses of a fit."""
     return list(itertools.chain(*fit.found))
@@ -317,7 +329,9 @@ def _plan_node(material, node, inputs):
     _, colors = inputs.colors(color)
 
     has = _shown(device.lacks_osl(lamps.current_scene()))
-    varying = varying_of(inputs) if given["kind"] == "principled" else None
+    is_principled = given["kind"] == "principled"
+    varying = varying_of(inputs) if is_principled else None
+    subsurface = subsurface_of(inputs) if is_principled else 0.0
 
     def looked(looks=looks, **other):
         """The Natives of the node with these values changed."""
@@ -339,7 +353,7 @@ def _plan_node(material, node, inputs):
         if varying and varying.socket == specular.TINT.socket and natives[0].metallic > 0:
             inputs.value(varying.socket)  # says that it is linked
         also = tuple(n for n in looked(ends, **other) if n not in natives)
-        fit = nearest(natives, colors, inputs.reaches(color), has, also)
+        fit = nearest(natives, colors, inputs.reaches(color), has, also, subsurface > 0)
         if fit is None:
             raise Refused(_lacking(natives, colors))
         part = _part(inputs, natives[0], fit, color)
@@ -351,7 +365,7 @@ def _plan_node(material, node, inputs):
     def error_without(**other):
         """The error of one model for the node with these values changed."""
         shades = (other["color"],) if "color" in other else colors
-        fit = nearest(looked(**other), shades, False, has)
+        fit = nearest(looked(**other), shades, False, has, (), subsurface > 0)
         return math.inf if fit is None else max(_errors(_found(fit)))
 
     def plan(part, fits, errors, **more):
@@ -371,26 +385,34 @@ def _plan_node(material, node, inputs):
         cause = functools.cache(functools.partial(_cause, given, looks, max(errors), error_without))
         return Plan(**vars(part), **more, cause=cause)
 
-    if given["kind"] != "principled":
+    if not is_principled:
         part, fit = near()
         return plan(part, [fit], _errors(_found(fit)))
     more = {"glows": glows(inputs), "transparent": is_transparent(inputs)}
     more["uppers"] = uppers_of(inputs)
+    more |= {"subsurface": subsurface, "transmits": transmits(inputs)}
     taken = _taken_by(more["uppers"], inputs)
+    through = (0.0,)
+    if more["transmits"]:
+        through = tuple(np.clip(inputs.ends(TRANSMISSION), 0, 1))
     single = None
     if not inputs.follows("Metallic"):
         part, fit = near()
         is_pure = given["metallic"] in (0, 1)
-        if is_pure or not varying and not (fit.lost and inputs.follows(color)):
-            single = plan(part, [fit], _errors_below(_found(fit), taken), **more)
+        found = _beside(fit.found, through)
+        alone = not (varying or subsurface or more["transmits"])
+        if is_pure or alone and not (fit.lost and inputs.follows(color)):
+            errors = _errors_below(itertools.chain(*found), taken)
+            single = plan(part, [fit], errors, **more)
         if is_pure:
             return single
     (part, plain), (metal, fit) = near(metallic=0.0), near(metallic=1.0)
+    plastics = _beside(plain.found, through)
     if (share := inputs.mean("Metallic")) is None:
-        errors = _errors_below(_found(plain) + _found(fit), taken)
+        errors = _errors_below(itertools.chain(*plastics, *fit.found), taken)
     else:
         share = min(max(share, 0.0), 1.0)
-        of_colors = zip(plain.found, fit.found, strict=True)
+        of_colors = zip(plastics, fit.found, strict=True)
         pairs = (pair for both in of_colors for pair in itertools.product(*both))
         errors = _errors_below([_mixed(share, *pair) for pair in pairs], taken)
     mixed = plan(part, [plain, fit], errors, metal=metal, **more)
@@ -457,7 +479,7 @@ def _of_group(made):
     if tree.is_embedded_data:
         return made
     others = tuple(m for m in model_nodes.users_of(tree) if m != made.material)
-    effective = effective_sockets(made.node, made.uppers)
+    effective = effective_sockets(made.node, made.effects)
     kept = {name for socket in made.kept for name in _group_inputs(made.node.inputs[socket])}
     lost = [name for socket in effective for name in _group_inputs(socket) if name not in kept]
     return replace(made, others=others, unused=tuple(dict.fromkeys(lost)))
