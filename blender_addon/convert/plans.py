@@ -26,6 +26,7 @@ from ..nearest.nearest_model import (
 from ..packs import device, pack
 from ..packs.parameter_values import canonical
 from ..trees import animation, shader_trees
+from .errors import all_found, beside, errors_below, errors_of, of_mixture, taken_by
 from .filter_glossy import is_filtered
 from .instances import Instances
 from .kept_effects import TRANSMISSION, effective_sockets, subsurface_of, transmits, uppers_of
@@ -47,8 +48,6 @@ from .node_values import (
 from .planned_node import HELPS, Part, Plan
 from .seen_node import SeenNode
 
-#: Errors of nodes that reflect less, such as a black Glossy node, say nothing.
-_NO_LIGHT = 1e-4
 #: The model of smooth glass.
 _CLEAR = "fresnel_dielectric"
 
@@ -230,57 +229,6 @@ def _is_closure(part):
     return pack.model(part.model).is_closure(values)
 
 
-def _errors(found):
-    """Of (light, error) of each colour and roughness the errors, except where there is next to no
-    light."""
-    return [error for light, error in found if light > _NO_LIGHT] or [0.0]
-
-
-#: View cosines over which errors are averaged.
-_VIEWS = np.linspace(0.95, 0.25, 8)
-
-
-def _taken_by(uppers, inputs):
-    """The light that a node's Uppers keep from what lies below, at their smallest and their largest
-    weights."""
-    left = np.ones(2)
-    for upper in uppers:
-        weights = np.clip(inputs.ends(upper.weight), 0, 1)
-        rough = 0.0 if len(upper.rest[0]) == 1 else inputs.ends(upper.roughness)[0]
-        whole = 1 - float(layer.rest_at(upper.rest, _VIEWS, rough).mean())
-        left *= np.clip(1 - weights * upper.top * whole, 0, 1)
-    return tuple(dict.fromkeys(float(1 - share) for share in left))
-
-
-def _errors_below(found, taken):
-    """The errors of what lies below Uppers, which stay Blender's own, as shares of the light of
-    both. `taken`: as _taken_by() finds it."""
-    pairs = []
-    for light, error in found:
-        for share in taken:
-            below = (1 - share) * light
-            pairs.append((below + share, below * error / max(below + share, 1e-9)))
-    return _errors(pairs)
-
-
-def _beside(found, shares):
-    """The (light, error) of each colour and roughness, where these shares of it give way to
-    Blender's own glass, which loses no light."""
-    return [
-        [
-            ((1 - s) * light + s, (1 - s) * light * error / max((1 - s) * light + s, 1e-9))
-            for light, error in of_color
-            for s in dict.fromkeys(shares)
-        ]
-        for of_color in found
-    ]
-
-
-def _found(fit):
-    """(light, error) of all colours and roughnesses of a fit."""
-    return list(itertools.chain(*fit.found))
-
-
 def _lacking(natives, colors):
     """Why no model is near: a sentence."""
     if fit := nearest(natives, colors, False, _shown(False)):
@@ -288,7 +236,7 @@ def _lacking(natives, colors):
             "its nearest model, {model}, which sends {percent} % of the light in other directions "
             "than the node, needs Open Shading Language for its values",
             model=pack.model(fit.candidate.model).label,
-            percent=in_percent(max(_errors(_found(fit)))),
+            percent=in_percent(max(errors_of(all_found(fit)))),
         )
     models = dict.fromkeys(c.model for c in candidates(natives[0]))
     return say("this extension lacks the models that are near: {models}", models=", ".join(models))
@@ -366,7 +314,7 @@ def _plan_node(material, node, inputs):
         """The error of one model for the node with these values changed."""
         shades = (other["color"],) if "color" in other else colors
         fit = nearest(looked(**other), shades, False, has, (), subsurface > 0)
-        return math.inf if fit is None else max(_errors(_found(fit)))
+        return math.inf if fit is None else max(errors_of(all_found(fit)))
 
     def plan(part, fits, errors, **more):
         if inputs.follows(color) and any(fit.lost for fit in fits):
@@ -387,11 +335,11 @@ def _plan_node(material, node, inputs):
 
     if not is_principled:
         part, fit = near()
-        return plan(part, [fit], _errors(_found(fit)))
+        return plan(part, [fit], errors_of(all_found(fit)))
     more = {"glows": glows(inputs), "transparent": is_transparent(inputs)}
     more["uppers"] = uppers_of(inputs)
     more |= {"subsurface": subsurface, "transmits": transmits(inputs)}
-    taken = _taken_by(more["uppers"], inputs)
+    taken = taken_by(more["uppers"], inputs)
     through = (0.0,)
     if more["transmits"]:
         through = tuple(np.clip(inputs.ends(TRANSMISSION), 0, 1))
@@ -399,31 +347,24 @@ def _plan_node(material, node, inputs):
     if not inputs.follows("Metallic"):
         part, fit = near()
         is_pure = given["metallic"] in (0, 1)
-        found = _beside(fit.found, through)
+        found = beside(fit.found, through)
         alone = not (varying or subsurface or more["transmits"])
         if is_pure or alone and not (fit.lost and inputs.follows(color)):
-            errors = _errors_below(itertools.chain(*found), taken)
+            errors = errors_below(itertools.chain(*found), taken)
             single = plan(part, [fit], errors, **more)
         if is_pure:
             return single
     (part, plain), (metal, fit) = near(metallic=0.0), near(metallic=1.0)
-    plastics = _beside(plain.found, through)
+    plastics = beside(plain.found, through)
     if (share := inputs.mean("Metallic")) is None:
-        errors = _errors_below(itertools.chain(*plastics, *fit.found), taken)
+        errors = errors_below(itertools.chain(*plastics, *fit.found), taken)
     else:
         share = min(max(share, 0.0), 1.0)
         of_colors = zip(plastics, fit.found, strict=True)
         pairs = (pair for both in of_colors for pair in itertools.product(*both))
-        errors = _errors_below([_mixed(share, *pair) for pair in pairs], taken)
+        errors = errors_below([of_mixture(share, *pair) for pair in pairs], taken)
     mixed = plan(part, [plain, fit], errors, metal=metal, **more)
     return mixed if single is None or mixed.error < single.error else single
-
-
-def _mixed(share, plain, metal):
-    """(light, error) of a mixture of two parts, given those of each."""
-    lights = (1 - share) * plain[0], share * metal[0]
-    off = lights[0] * plain[1] + lights[1] * metal[1]
-    return sum(lights), off / max(sum(lights), 1e-9)
 
 
 def plan(materials):
