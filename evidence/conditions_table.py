@@ -12,30 +12,34 @@ from markdown_table import heading, line
 INTRODUCTION = """\
 # What settings and scenes do to the forms
 
-Made by `evidence/conditions`. Each row changes one thing in a clean scene: a grid of grooves, in
-which light bounces, under a sun and a bright sky. A cell is the resulting change in the mean
-radiance of a form, with its standard error. It is bold if it exceeds 2 % and 5 standard errors;
-"panel warns" follows if the panel warns of it. The forms represent all others of their kind: exact
-forms with a mirror, without one, and with a ramp; sampled forms with a mirror, of an anisotropic
-model, and without either; fits with microfacets, and with other lobes only; aimed forms with a base
-of microfacets, without a base, with a mirror, and with a base of ramps, which have the scene's
-lamps in their slots. `coupled` has r0 = 0.5, the others their defaults. Blender's own Diffuse and
-Glossy nodes are included for comparison. `tests/blender/test_every_fit.py` measures the same for
-fitted forms and twins of every model. Formula Nodes are not among the tables: `evidence/conditions
---form nodes` measures them, and [their page](nodes.md#settings-and-passes) says what it found.
+`evidence/conditions` makes this page. The scene is a grid of grooves, between which light is
+reflected several times, under a sun and a bright sky. Each row changes one thing in it.
 
-Tilted normals are those of the mesh, those of the input Normal, and the latter with Bump Map
-Correction on. The cell is the worst of three views: the fraction lost of all the light that the
-model reflects, or that Blender's own nodes of this colour reflect. It is bold if it differs from
-what the model's own rays lose below the surface.
-Passes: mean difference from the model's albedo, median angle from the true normal, and largest
-difference between the picture and the sum of its light groups. "lamp without shadows" is a sun
-overhead, and "lamp without multiple importance" a sun 1 rad wide; each is compared with the same
-sun with the setting on. "lamp linked elsewhere" adds a sun that is linked to another object only.
-"nine lamps for one" replaces the sun by nine suns, each with a ninth of its light. "sun without
-size": forms that sample directions show such a lamp as rare bright dots, so their median cells are
-compared; other forms are compared with a sun 0.02 wide. Exact forms with a mirror are omitted
-there, as a mirror can't show a lamp without a size.
+- A cell is the change in a form's mean radiance, with its standard error.
+- It is bold if it exceeds 2 % and 5 standard errors. "panel warns" means that the panel shows a
+  warning.
+- The forms stand for all others of their kind. `coupled` has r0 = 0.5, the others their defaults.
+  Aimed forms know the scene's lamps. Blender's Diffuse and Glossy nodes are there for comparison.
+- `tests/blender/test_every_fit.py` measures the same for fitted forms and twins of every model, and
+  `evidence/conditions --form nodes` for Formula Nodes, whose results are [on their
+  page](nodes.md#settings-and-passes).
+
+Some rows are measured in another way:
+
+- **smooth normals, Normal input, bump correction**: a cell is the fraction of the reflected light
+  that is lost, in the worst of three views, where normals are tilted. The normals are those of the
+  mesh, those of the input *Normal*, and the same with Bump Map Correction on. A cell is bold if it
+  differs from what the model's own rays lose below the surface.
+- **denoising albedo, colour passes**: the mean difference from the model's albedo. **denoising
+  normal**: the median angle from the true normal. **light group**: the largest difference between
+  the picture and the sum of its light groups.
+- **lamp without shadows** has a sun overhead, and **lamp without multiple importance** a sun 1 rad
+  wide. Each is compared with the same sun with the setting on.
+- **lamp linked elsewhere** adds a sun that is linked to another object only. **nine lamps for one**
+  replaces the sun by nine suns with a ninth of its light each.
+- **sun without size** is compared with a sun 0.02 rad wide. Forms that sample directions show it as
+  rare, bright dots, so for them medians are compared. A mirror can't show a lamp without a size, so
+  exact forms with a mirror have no such row.
 """
 
 

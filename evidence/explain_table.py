@@ -22,21 +22,22 @@ SCENES = {
 INTRODUCTION = """\
 # What a build leaves out, and why: three scenes
 
-Made by `evidence/explain` from the JSON that the commands below print. An arrow leads from the
-whole extension to the one cut to the scene. In the first table of a scene it leads from the form
-that a material gets without a budget to the one that is chosen. In the second it leads from the
-whole shader of the chosen form, which has all parameters and samples up to eight directions, to
-the shader for the scene. Without an arrow both are the same.
+`evidence/explain` makes this page from the JSON that the commands below print.
 
-- Costs are those in [what each form takes](tables/forms.md), measured for each model and form with
-  default parameters: they change with the form, but do not include the savings by constants. Errors
-  are measured with the scene's parameters.
-- Bytes and statements are those of a shader's text, for all of its combinations of choices, and
-  statements without the library; operations are the largest number that one combination executes.
-  Floats are those of the tables of albedo and fit that the shader reads.
-- A fit is made for the scene's parameters, so there is no other shader to compare with.
-- If a constant colour is folded into a table, the table becomes three, one for each channel: bytes
-  or floats may increase.
+In the tables, an arrow stands between two values. The first is that of the whole extension, the
+second that of the extension for this scene; without an arrow both are the same. For materials, they
+are the form that `auto` means without a budget, and the form that was chosen. For models, they are
+the sizes of the whole shader, which has all parameters, and of the shader for the scene.
+
+- **Costs** are those in [what each form takes](tables/forms.md). They were measured for each model
+  and form with default parameters, so they do not show what constants save. **Errors** are measured
+  with the scene's parameters.
+- **Bytes and statements** are those of a shader's text with all combinations of its choices,
+  statements without those of the library. **Operations** are the largest number that one
+  combination executes. **Floats** are those of the tables of albedo and fit that the shader reads.
+- A fit is made for the scene's parameters, so a fitted form has no other shader to compare with.
+- If a constant colour becomes part of a table, the table becomes three, one for each channel. Bytes
+  or floats may then increase.
 """
 
 SIZES = {

@@ -3,13 +3,12 @@
 converted."""
 
 import functools
-from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
 from ..common.i18n import Sentence, say
-from ..nearest import layer, native_bsdf, specular
+from ..nearest import native_bsdf, specular
 from ..nearest.native_bsdf import Native
 from ..trees import animation, shader_trees, shader_values, value_bounds
 
@@ -41,17 +40,9 @@ STAYING = {
     )
 }
 #: Sockets that must have the value at which they have no effect, as no model offers their effect.
-_OFF = {
-    "Subsurface Weight": (0.0, "Subsurface"),
-    "Transmission Weight": (0.0, "Transmission"),
-    "Coat Weight": (0.0, "Coat"),
-    "Sheen Weight": (0.0, "Sheen"),
-    "Thin Film Thickness": (0.0, "Thin Film"),
-    "Thin Wall": (0.0, "Thin Wall"),
-}
+_OFF = {"Thin Film Thickness": (0.0, "Thin Film"), "Thin Wall": (0.0, "Thin Wall")}
 #: Sockets that the conversion understands, by kind; any other socket with a changed value is a
-#: reason to refuse. Those of subsurface, coat, sheen and thin film have no effect while that is
-#: off.
+#: reason to refuse.
 KNOWN_SOCKETS = {
     "diffuse": {"Color", "Roughness", "Normal", "Weight"},
     "glossy": {"Color", "Roughness", "Anisotropy", "Rotation", "Normal", "Tangent", "Weight"},
@@ -63,10 +54,10 @@ KNOWN_SOCKETS = {
         *_OFF,
         *("Base Color", "Metallic", "Roughness", "IOR", "Alpha", "Normal", "Weight"),
         *("Diffuse Roughness", "Specular IOR Level", "Specular Tint"),
-        *("Anisotropic", "Anisotropic Rotation", "Tangent"),
-        *("Subsurface Radius", "Subsurface Scale", "Subsurface IOR", "Subsurface Anisotropy"),
-        *("Coat Roughness", "Coat IOR", "Coat Tint", "Coat Normal"),
-        *("Sheen Roughness", "Sheen Tint", "Thin Film IOR"),
+        *("Anisotropic", "Anisotropic Rotation", "Tangent", "Transmission Weight"),
+        *("Subsurface Weight", "Subsurface Radius", "Subsurface Scale", "Subsurface IOR"),
+        *("Subsurface Anisotropy", "Coat Weight", "Coat Roughness", "Coat IOR", "Coat Tint"),
+        *("Coat Normal", "Sheen Weight", "Sheen Roughness", "Sheen Tint", "Thin Film IOR"),
         *("Emission Color", "Emission Strength"),
     },
 }
@@ -76,58 +67,6 @@ _KNOWN_SETTINGS = {"distribution", "subsurface_method"}
 
 #: Sockets to which importers and material generators often link an image of a single colour.
 _OFTEN_ONE_COLOR = {"Alpha", "Base Color", "Color", "Emission Color", "Metallic"}
-
-
-#: Sockets of these effects do nothing while the effect is off.
-_WITHOUT_EFFECT = ("Weight", "Subsurface ", "Coat ", "Sheen ", "Thin Film ")
-
-
-#: Effects of a Principled node that lie over all others, and the sockets whose links a conversion
-#: keeps.
-UPPER_SOCKETS = {
-    "Sheen": ("Sheen Weight",),
-    "Coat": ("Coat Weight", "Coat Roughness", "Coat Normal"),
-}
-UPPER_WEIGHTS = {f"{name} Weight" for name in UPPER_SOCKETS}
-
-
-@dataclass(frozen=True)
-class Upper:
-    """An effect of a Principled node that stays, over the models that replace the others."""
-
-    #: Of UPPER_SOCKETS.
-    name: str
-    #: The light that it leaves to what lies below, where it covers all: a polynomial as of
-    #: layer.rest().
-    rest: tuple
-    #: The largest channel of its tint.
-    top: float = 1.0
-
-    @property
-    def weight(self):
-        """The name of the socket of its weight."""
-        return f"{self.name} Weight"
-
-    @property
-    def roughness(self):
-        """The name of the socket of its roughness."""
-        return f"{self.name} Roughness"
-
-
-def effective_sockets(node, uppers):
-    """The sockets of a convertible node that do something, or would if they had another value.
-    `uppers`: its Uppers."""
-    of_uppers = {name for upper in uppers for name in UPPER_SOCKETS[upper.name]}
-    return [
-        socket
-        for socket in node.inputs
-        if socket.enabled
-        and (
-            socket.name in _OFF
-            or socket.name in of_uppers
-            or not socket.name.startswith(_WITHOUT_EFFECT)
-        )
-    ]
 
 
 class Refused(ValueError):
@@ -286,11 +225,11 @@ class Inputs:
                 raise Refused(say("it has {what}", what=Sentence(setting.name)))
 
 
-def check_off(inputs, but=()):
-    """Raises Refused if a Principled node has an effect that no model offers, except those of the
-    sockets `but`."""
+def check_off(inputs):
+    """Raises Refused if a Principled node has an effect that no model offers and that can't stay
+    Blender's own."""
     for name, (off, what) in _OFF.items():
-        if name not in but and inputs.value(name, off) != off:
+        if inputs.value(name, off) != off:
             raise Refused(say("it has {what}", what=Sentence(what)))
 
 
@@ -309,19 +248,19 @@ def given_of(node, inputs):
         given["beckmann"] = distribution == "BECKMANN"
         given["multiscatter"] = distribution == "MULTI_GGX"
     if kind == "principled":
-        check_off(inputs, but=UPPER_WEIGHTS)
+        check_off(inputs)
         metallic = 0.5 if (known := inputs.mean("Metallic")) is None else known
         given["metallic"] = min(max(metallic, 0.0), 1.0)
         if is_plastic(inputs):
-            given["f0"] = _f0_of(inputs)
-            bases = _roughnesses(inputs, "Diffuse Roughness")
+            given["f0"] = f0_of(inputs)
+            bases = roughnesses_of(inputs, "Diffuse Roughness")
         varying = varying_of(inputs)
         if varying and varying.socket == specular.TINT.socket:
             tint = (varying.top,) * 3
         else:
             tint = inputs.value("Specular Tint", (1.0, 1.0, 1.0))
         given["tint"] = tuple(max(c, 0.0) for c in tint)
-    roughnesses = _roughnesses(inputs, "Roughness")
+    roughnesses = roughnesses_of(inputs, "Roughness")
     stretches = (1.0,)
     if kind in ("glossy", "principled") and not is_mirror(roughnesses):
         stretches = _stretches(inputs, kind)
@@ -344,7 +283,7 @@ def _in_turn(looks, count):
     return [{name: looks[name][i] for name in looks} for i in range(count)]
 
 
-def _roughnesses(inputs, name):
+def roughnesses_of(inputs, name):
     """The roughness of a socket, or several."""
     return ROUGHNESSES if inputs.follows(name) else (min(max(inputs.value(name), 0.0), 1.0),)
 
@@ -386,7 +325,7 @@ def both_linked(socket, other):
     )
 
 
-def _f0_of(inputs):
+def f0_of(inputs):
     """Reflectance of the interface of a Principled node at normal incidence, at the highest level
     if the level varies."""
     varying = varying_of(inputs)
@@ -453,33 +392,6 @@ def _stretches(inputs, kind):
         return tuple(_stretch_of(a) for a in found)
     found = tuple(min(max(a, -_MOST_GLOSSY), _MOST_GLOSSY) for a in found)
     return tuple((1 - a) ** 2 if a > 0 else 1 / (1 + a) ** 2 for a in found)
-
-
-def uppers_of(inputs):
-    """The Uppers of a Principled node."""
-    found = []
-    for weight, upper in (("Sheen Weight", _sheen), ("Coat Weight", _coat)):
-        if weight in inputs and inputs.constant(weight) != 0:
-            inputs.follows(weight)  # says that something behind its link is animated
-            found.append(upper(inputs))
-    return tuple(found)
-
-
-def _coat(inputs):
-    # No node gives a shader a colour.
-    if inputs.value("Coat Tint", (1.0, 1.0, 1.0)) != (1, 1, 1):
-        raise Refused(say("it has {what}", what=Sentence("Coat Tint")))
-    ior = max(inputs.value("Coat IOR"), 1.0)
-    roughnesses = _roughnesses(inputs, "Coat Roughness")
-    f0 = ((ior - 1) / (ior + 1)) ** 2
-    one = roughnesses[0] if len(roughnesses) == 1 else None
-    return Upper("Coat", layer.below_coat(f0, one))
-
-
-def _sheen(inputs):
-    top = max(*inputs.value("Sheen Tint"), 0.0)
-    roughness = min(max(inputs.value("Sheen Roughness"), 0.0), 1.0)
-    return Upper("Sheen", layer.below_sheen(roughness), top)
 
 
 def glows(inputs):

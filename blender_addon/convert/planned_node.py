@@ -12,7 +12,14 @@ from ..common.i18n import Sentence, in_percent, say
 from ..nearest import specular
 from ..packs import pack
 from ..trees import shader_values
-from .node_values import ANISOTROPY, KINDS, UPPER_SOCKETS
+from .kept_effects import (
+    SUBSURFACE_SHARED,
+    SUBSURFACE_SOCKETS,
+    TRANSMISSION,
+    TRANSMISSION_SHARED,
+    UPPER_SOCKETS,
+)
+from .node_values import ANISOTROPY, KINDS
 from .seen_node import SeenNode
 
 #: Custom property of the nodes that were added along with it: the name of the group node.
@@ -81,8 +88,12 @@ class Plan(Part):
     #: Alpha.
     glows: bool = False
     transparent: bool = False
-    #: The node_values.Uppers that lie over the models.
+    #: The kept_effects.Uppers that lie over the models.
     uppers: tuple = ()
+    #: The IOR of the Subsurface Scattering node that is mixed into the base; 0 if there is none.
+    subsurface: float = 0.0
+    #: Whether a Principled node that transmits light is mixed in by the node's Transmission Weight.
+    transmits: bool = False
     #: Whether the models need the node's tangent: that of its link or Cycles' default one, turned.
     anisotropic: bool = False
     #: Whether Filter Glossy blurs the node so that it shows, but not its model.
@@ -137,6 +148,14 @@ class Plan(Part):
         return high if low == high else say("{low} to {high}", low=low, high=high)
 
     @property
+    def effects(self):
+        """The sockets of those effects of the node that stay Blender's own."""
+        found = {name for upper in self.uppers for name in UPPER_SOCKETS[upper.name]}
+        found |= {TRANSMISSION} if self.transmits else set()
+        subsurface = SUBSURFACE_SOCKETS if self.subsurface else ()
+        return found | {name for name in subsurface if name in self.node.inputs}
+
+    @property
     def kept(self):
         """The sockets of the node whose links stay."""
         parts = [part for part in self.parts if part.model]
@@ -152,8 +171,9 @@ class Plan(Part):
         found |= {part.root[1] for part in parts if part.root}
         found |= {"Metallic"} if self.metal else set()
         found |= {"Alpha"} if self.transparent else set()
-        for upper in self.uppers:
-            found |= set(UPPER_SOCKETS[upper.name])
+        found |= self.effects
+        found |= set(SUBSURFACE_SHARED) if self.subsurface else set()
+        found |= set(TRANSMISSION_SHARED) if self.transmits else set()
         return found | ({"Emission Color", "Emission Strength"} if self.glows else set())
 
     @property
@@ -176,6 +196,16 @@ class Plan(Part):
         ):
             if used:
                 found.setdefault(socket, []).append(None)
+        for name in self.effects:
+            # The weight of an Upper also becomes that of the light below.
+            is_upper = any(name.startswith(upper.name) for upper in self.uppers)
+            found.setdefault(name, []).append(() if is_upper else None)
+        for names, used in (
+            (SUBSURFACE_SHARED, self.subsurface),
+            (TRANSMISSION_SHARED, self.transmits),
+        ):
+            for name in names if used else ():
+                found.setdefault(name, []).append(())
         return {name: at[0] for name, at in found.items() if len(at) == 1 and at[0] != ()}
 
     @property

@@ -26,31 +26,28 @@ from ..nearest.nearest_model import (
 from ..packs import device, pack
 from ..packs.parameter_values import canonical
 from ..trees import animation, shader_trees
+from .errors import all_found, beside, errors_below, errors_of, of_mixture, taken_by
 from .filter_glossy import is_filtered
 from .instances import Instances
+from .kept_effects import TRANSMISSION, effective_sockets, subsurface_of, transmits, uppers_of
 from .node_values import (
     ANISOTROPY,
     KINDS,
     KNOWN_SOCKETS,
     STAYING,
-    UPPER_WEIGHTS,
     Inputs,
     Refused,
     both_linked,
     check_off,
     color_of,
-    effective_sockets,
     given_of,
     glows,
     is_transparent,
-    uppers_of,
     varying_of,
 )
 from .planned_node import HELPS, Part, Plan
 from .seen_node import SeenNode
 
-#: Errors of nodes that reflect less, such as a black Glossy node, say nothing.
-_NO_LIGHT = 1e-4
 #: The model of smooth glass.
 _CLEAR = "fresnel_dielectric"
 
@@ -73,14 +70,15 @@ def _plan_glass(material, node, inputs):
 def _is_clear(inputs):
     """Whether a Principled node transmits all light that enters it, as glass does."""
     name = "Transmission Weight"
-    return name in inputs and inputs.constant(name) == 1 and inputs.constant("Metallic") == 0
+    known = inputs.constant(name) if name in inputs else None
+    return known is not None and known >= 1 and inputs.constant("Metallic") == 0
 
 
 def _plan_clear(material, node, inputs):
     """The Plan for a Principled node that is smooth glass."""
     inputs.setting("mute")
     inputs.check_unknown(KNOWN_SOCKETS["principled"])
-    check_off(inputs, but={"Transmission Weight", *UPPER_WEIGHTS})
+    check_off(inputs)
     if inputs.value("Roughness") > 1e-3:
         raise Refused(say("the model of rough glass is darker under lamps"))
     if inputs.value("Specular IOR Level") != 0.5:
@@ -231,44 +229,6 @@ def _is_closure(part):
     return pack.model(part.model).is_closure(values)
 
 
-def _errors(found):
-    """Of (light, error) of each colour and roughness the errors, except where there is next to no
-    light."""
-    return [error for light, error in found if light > _NO_LIGHT] or [0.0]
-
-
-#: View cosines over which errors are averaged.
-_VIEWS = np.linspace(0.95, 0.25, 8)
-
-
-def _taken_by(uppers, inputs):
-    """The light that a node's Uppers keep from what lies below, at their smallest and their largest
-    weights."""
-    left = np.ones(2)
-    for upper in uppers:
-        weights = np.clip(inputs.ends(upper.weight), 0, 1)
-        rough = 0.0 if len(upper.rest[0]) == 1 else inputs.ends(upper.roughness)[0]
-        whole = 1 - float(layer.rest_at(upper.rest, _VIEWS, rough).mean())
-        left *= np.clip(1 - weights * upper.top * whole, 0, 1)
-    return tuple(dict.fromkeys(float(1 - share) for share in left))
-
-
-def _errors_below(found, taken):
-    """The errors of what lies below Uppers, which stay Blender's own, as shares of the light of
-    both. `taken`: as _taken_by() finds it."""
-    pairs = []
-    for light, error in found:
-        for share in taken:
-            below = (1 - share) * light
-            pairs.append((below + share, below * error / max(below + share, 1e-9)))
-    return _errors(pairs)
-
-
-def _found(fit):
-    """(light, error) of all colours and roughnesses of a fit."""
-    return list(itertools.chain(*fit.found))
-
-
 def _lacking(natives, colors):
     """Why no model is near: a sentence."""
     if fit := nearest(natives, colors, False, _shown(False)):
@@ -276,7 +236,7 @@ def _lacking(natives, colors):
             "its nearest model, {model}, which sends {percent} % of the light in other directions "
             "than the node, needs Open Shading Language for its values",
             model=pack.model(fit.candidate.model).label,
-            percent=in_percent(max(_errors(_found(fit)))),
+            percent=in_percent(max(errors_of(all_found(fit)))),
         )
     models = dict.fromkeys(c.model for c in candidates(natives[0]))
     return say("this extension lacks the models that are near: {models}", models=", ".join(models))
@@ -317,7 +277,9 @@ def _plan_node(material, node, inputs):
     _, colors = inputs.colors(color)
 
     has = _shown(device.lacks_osl(lamps.current_scene()))
-    varying = varying_of(inputs) if given["kind"] == "principled" else None
+    is_principled = given["kind"] == "principled"
+    varying = varying_of(inputs) if is_principled else None
+    subsurface = subsurface_of(inputs) if is_principled else 0.0
 
     def looked(looks=looks, **other):
         """The Natives of the node with these values changed."""
@@ -339,7 +301,7 @@ def _plan_node(material, node, inputs):
         if varying and varying.socket == specular.TINT.socket and natives[0].metallic > 0:
             inputs.value(varying.socket)  # says that it is linked
         also = tuple(n for n in looked(ends, **other) if n not in natives)
-        fit = nearest(natives, colors, inputs.reaches(color), has, also)
+        fit = nearest(natives, colors, inputs.reaches(color), has, also, subsurface > 0)
         if fit is None:
             raise Refused(_lacking(natives, colors))
         part = _part(inputs, natives[0], fit, color)
@@ -351,8 +313,8 @@ def _plan_node(material, node, inputs):
     def error_without(**other):
         """The error of one model for the node with these values changed."""
         shades = (other["color"],) if "color" in other else colors
-        fit = nearest(looked(**other), shades, False, has)
-        return math.inf if fit is None else max(_errors(_found(fit)))
+        fit = nearest(looked(**other), shades, False, has, (), subsurface > 0)
+        return math.inf if fit is None else max(errors_of(all_found(fit)))
 
     def plan(part, fits, errors, **more):
         if inputs.follows(color) and any(fit.lost for fit in fits):
@@ -371,37 +333,38 @@ def _plan_node(material, node, inputs):
         cause = functools.cache(functools.partial(_cause, given, looks, max(errors), error_without))
         return Plan(**vars(part), **more, cause=cause)
 
-    if given["kind"] != "principled":
+    if not is_principled:
         part, fit = near()
-        return plan(part, [fit], _errors(_found(fit)))
+        return plan(part, [fit], errors_of(all_found(fit)))
     more = {"glows": glows(inputs), "transparent": is_transparent(inputs)}
     more["uppers"] = uppers_of(inputs)
-    taken = _taken_by(more["uppers"], inputs)
+    more |= {"subsurface": subsurface, "transmits": transmits(inputs)}
+    taken = taken_by(more["uppers"], inputs)
+    through = (0.0,)
+    if more["transmits"]:
+        through = tuple(np.clip(inputs.ends(TRANSMISSION), 0, 1))
     single = None
     if not inputs.follows("Metallic"):
         part, fit = near()
         is_pure = given["metallic"] in (0, 1)
-        if is_pure or not varying and not (fit.lost and inputs.follows(color)):
-            single = plan(part, [fit], _errors_below(_found(fit), taken), **more)
+        found = beside(fit.found, through)
+        alone = not (varying or subsurface or more["transmits"])
+        if is_pure or alone and not (fit.lost and inputs.follows(color)):
+            errors = errors_below(itertools.chain(*found), taken)
+            single = plan(part, [fit], errors, **more)
         if is_pure:
             return single
     (part, plain), (metal, fit) = near(metallic=0.0), near(metallic=1.0)
+    plastics = beside(plain.found, through)
     if (share := inputs.mean("Metallic")) is None:
-        errors = _errors_below(_found(plain) + _found(fit), taken)
+        errors = errors_below(itertools.chain(*plastics, *fit.found), taken)
     else:
         share = min(max(share, 0.0), 1.0)
-        of_colors = zip(plain.found, fit.found, strict=True)
+        of_colors = zip(plastics, fit.found, strict=True)
         pairs = (pair for both in of_colors for pair in itertools.product(*both))
-        errors = _errors_below([_mixed(share, *pair) for pair in pairs], taken)
+        errors = errors_below([of_mixture(share, *pair) for pair in pairs], taken)
     mixed = plan(part, [plain, fit], errors, metal=metal, **more)
     return mixed if single is None or mixed.error < single.error else single
-
-
-def _mixed(share, plain, metal):
-    """(light, error) of a mixture of two parts, given those of each."""
-    lights = (1 - share) * plain[0], share * metal[0]
-    off = lights[0] * plain[1] + lights[1] * metal[1]
-    return sum(lights), off / max(sum(lights), 1e-9)
 
 
 def plan(materials):
@@ -457,7 +420,7 @@ def _of_group(made):
     if tree.is_embedded_data:
         return made
     others = tuple(m for m in model_nodes.users_of(tree) if m != made.material)
-    effective = effective_sockets(made.node, made.uppers)
+    effective = effective_sockets(made.node, made.effects)
     kept = {name for socket in made.kept for name in _group_inputs(made.node.inputs[socket])}
     lost = [name for socket in effective for name in _group_inputs(socket) if name not in kept]
     return replace(made, others=others, unused=tuple(dict.fromkeys(lost)))

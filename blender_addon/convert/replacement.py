@@ -11,6 +11,7 @@ from ..groups import bump_correction, model_nodes, nodes
 from ..nearest import native_bsdf
 from ..packs import pack
 from ..trees import animation, shader_trees, shader_values
+from .kept_effects import SUBSURFACE, TRANSMISSION, TRANSMISSION_SHARED
 from .node_values import ANISOTROPY, KINDS, RATIO, has_own_animation
 from .planned_node import HELPS
 
@@ -191,8 +192,12 @@ class Replacement:
         if plan.base:
             left = self._helper("ShaderNodeMixShader")
             links.new(self._rest(), left.inputs[0])
-            links.new(others[0], left.inputs[2])
+            links.new(self._scattering(others[0]), left.inputs[2])
             shader = self._sum(shader, left.outputs[0])
+        else:
+            shader = self._scattering(shader)
+        if plan.transmits:
+            shader = self._mix(TRANSMISSION, shader, self._glass())
         if plan.metal:
             shader = self._mix("Metallic", shader, others[-1])
         if plan.uppers:
@@ -206,6 +211,47 @@ class Replacement:
             clear = self._helper("ShaderNodeBsdfTransparent")
             shader = self._mix("Alpha", clear.outputs[0], shader)
         return shader
+
+    def _scattering(self, base):
+        """A base, part of which scatters light beneath the surface."""
+        if not self._plan.subsurface:
+            return base
+        scattering = self._helper("ShaderNodeSubsurfaceScattering")
+        scattering.falloff = self._node.subsurface_method
+        # Where a Principled node has a socket for this, that replaces it.
+        scattering.inputs["IOR"].default_value = self._plan.subsurface
+        self._give(scattering.inputs["Color"], "Base Color")
+        for socket in scattering.inputs:
+            name = f"Subsurface {socket.name}"
+            if name in self._node.inputs and name != SUBSURFACE:
+                self._give(socket, name)
+        if "Roughness" in scattering.inputs:
+            # Of this node it is the width of the facets, of a Principled node the root of it.
+            if self._source("Roughness"):
+                rough = self._roughness()
+                rough = self._operation("ShaderNodeMath", "MULTIPLY", rough, rough)
+                self._tree.links.new(rough, scattering.inputs["Roughness"])
+            else:
+                rough = shader_values.constant(self._node.inputs["Roughness"])
+                scattering.inputs["Roughness"].default_value = min(max(rough, 0.0), 1.0) ** 2
+        self._link_vectors(scattering)
+        return self._mix(SUBSURFACE, base, scattering.outputs[0])
+
+    def _glass(self):
+        """A Principled node with the transmission of the replaced one alone."""
+        glass = self._helper("ShaderNodeBsdfPrincipled")
+        glass.distribution = self._node.distribution
+        glass.inputs[TRANSMISSION].default_value = 1
+        for name in TRANSMISSION_SHARED:
+            self._give(glass.inputs[name], name)
+        self._link_vectors(glass)
+        return glass.outputs[0]
+
+    def _link_vectors(self, helper):
+        """Gives a node the normal and the tangent of the replaced one."""
+        for name in ("Normal", "Tangent"):
+            if name in helper.inputs and (source := self._vector(name)):
+                self._tree.links.new(source, helper.inputs[name])
 
     def _covered(self, below):
         """A shader under the Uppers of the node: a Principled node that has no other effect but
@@ -420,7 +466,7 @@ class Replacement:
             self._tree.links.new(source, socket)
             return
         value = shader_values.constant(self._node.inputs[name])
-        socket.default_value = (*value, 1.0) if isinstance(value, tuple) else value
+        socket.default_value = (*value, 1.0) if socket.type == "RGBA" else value
         if name in self._direct:
             self._given[name] = socket
 

@@ -235,20 +235,26 @@ def _layered(natives, has):
     def layer_of(n):
         return values | _distribution(n)
 
+    if native.is_mirror:
+        sharp = values | {"ax": NARROWEST, "ay": NARROWEST}
+        return (Candidate("microfacet", lambda n: sharp, base=base),)
     return (Candidate("microfacet", layer_of, _FACETS, base=base, is_own=True),)
 
 
-def candidates(native, has=lambda model, values: True, natives=()):
+def candidates(native, has=lambda model, values: True, natives=(), layered=False):
     """The candidates for a node, or for `natives` of which it is the first, among the models and
     values for which has(model, values) is true. A model without a highlight is no candidate for a
-    node that has one, however weak."""
-    found = _candidates(native, has, natives or (native,))
+    node that has one, however weak. `layered`: a highlight of a dielectric has to have its base as
+    another model."""
+    found = _candidates(native, has, natives or (native,), layered)
     return tuple(c for c in found if has(c.model, c.values(native)))
 
 
-def _candidates(native, has, natives):
+def _candidates(native, has, natives, layered):
     if native.is_matte:
         return _MATTE
+    if layered and native.metallic == 0:
+        return _layered(natives, has)
     if native.is_mirror and native.kind == "glossy":
         return (*_MIRRORS, _METAL_MIRROR)
     if native.is_mirror and native.metallic == 0:
@@ -295,14 +301,14 @@ class Fit:
 
 
 @functools.lru_cache(maxsize=256)
-def nearest(natives, colors, colored, has, also=()):
+def nearest(natives, colors, colored, has, also=(), layered=False):
     """The Fit to a tuple of nodes that differ only in roughnesses and stretch; None if no model
     comes near.
 
     Considers the models and values for which has(model, values) is true. The Fit includes the
     errors for nodes of other colours, `colors`, and of other roughnesses, `also`. `colored`:
     whether the node's colour is linked; a model without a colour parameter would lose that
-    link."""
+    link. `layered`: as for candidates()."""
     native, targets, found = natives[0], [Target(n) for n in natives], []
     follows = len({n.roughness for n in natives}) > 1
 
@@ -316,7 +322,7 @@ def nearest(natives, colors, colored, has, also=()):
         errors = (tuple(found(here) for here in of_color) for of_color in shades)
         return Fit(candidate, factor, tuple(errors), lost)
 
-    considered = candidates(native, has, natives)
+    considered = candidates(native, has, natives, layered)
     for candidate in considered:
         if candidate.is_own and (candidate.is_colored or not colored):
             factor = candidate.width.usual if candidate.width else 1.0

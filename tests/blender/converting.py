@@ -23,7 +23,7 @@ def material_of(kind, distribution=None, **inputs):
         node.distribution = distribution
     for name, value in inputs.items():
         socket = node.inputs[name.replace("_", " ")]
-        socket.default_value = (*value, 1.0) if isinstance(value, tuple) else value
+        socket.default_value = (*value, 1.0) if socket.type == "RGBA" else value
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     tree.links.new(node.outputs[0], output.inputs["Surface"])
     return material, node

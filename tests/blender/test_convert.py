@@ -771,6 +771,55 @@ def test_coat_and_sheen_stay_blenders_own(extension, convert):
     assert len(material.node_tree.nodes) == count and node.outputs[0].is_linked
 
 
+def test_subsurface_scattering_and_transmission_stay_blenders_own(extension, convert):
+    """Also where their inputs are linked or animated: the scattering beneath the highlight, the
+    glass beside the model."""
+    material, node = material_of(
+        "principled",
+        Subsurface_Weight=0.7,
+        Subsurface_Scale=0.3,
+        Subsurface_Radius=(0.5, 0.2, 0.1),
+        Transmission_Weight=0.4,
+        IOR=1.8,
+        Specular_IOR_Level=0.3,
+    )
+    keyed(node.inputs["Subsurface Weight"])
+    sources = {
+        socket: linked(material, node, socket, "ShaderNodeTexNoise")
+        for socket in ("Subsurface Scale", "Transmission Weight", "Roughness", "Normal")
+    }
+    plan = only(extension.api.plan_conversion([material]))
+    assert set(plan.kept) >= {"Subsurface Weight", "Subsurface Radius", *sources}
+    assert plan.least_error == 0 < plan.error  # all light may pass, or none
+    count = len(material.node_tree.nodes)
+    assert extension.api.convert_materials([plan]) == 1
+    nodes = [n for n in material.node_tree.nodes if n != node and n.outputs]
+    (scattering,) = (n for n in nodes if n.bl_idname == "ShaderNodeSubsurfaceScattering")
+    (glass,) = (n for n in nodes if n.bl_idname == node.bl_idname)
+    assert scattering.falloff == node.subsurface_method
+    assert tuple(scattering.inputs["Radius"].default_value) == pytest.approx((0.5, 0.2, 0.1))
+    # What the level makes of the IOR is that of the interface.
+    f0 = ((1.8 - 1) / (1.8 + 1)) ** 2 * 2 * 0.3
+    ior = (1 + f0**0.5) / (1 - f0**0.5)
+    assert scattering.inputs["IOR"].default_value == pytest.approx(ior, rel=1e-5)
+    assert scattering.inputs["Scale"].links[0].from_node == sources["Subsurface Scale"]
+    assert scattering.inputs["Normal"].links[0].from_node == sources["Normal"]
+    assert glass.inputs["Transmission Weight"].default_value == 1
+    assert glass.inputs["IOR"].default_value == pytest.approx(1.8)
+    for socket in ("Roughness", "Normal"):
+        assert glass.inputs[socket].links[0].from_node == sources[socket]
+    assert not convert.plan([material])
+    assert convert.restore(material) == 1
+    assert len(material.node_tree.nodes) == count and node.outputs[0].is_linked
+
+
+def test_metal_neither_scatters_nor_transmits(extension, convert):
+    inputs = {"Metallic": 1.0, "Subsurface_Weight": 0.7, "Transmission_Weight": 0.4}
+    material, _ = material_of("principled", "GGX", **inputs)
+    plan = only(convert.plan([material]))
+    assert plan.error < 1e-6 and not plan.subsurface and not plan.transmits
+
+
 def test_an_animated_distribution_is_said(convert):
     material, node = material_of("glossy")
     keyed(node, "distribution")
@@ -914,7 +963,6 @@ def test_a_linked_roughness_is_followed(extension, convert):
 
 REFUSED = [
     ("principled", {"Coat_Weight": 0.5, "Coat_Tint": (1.0, 0.5, 0.5)}, "it has Coat Tint"),
-    ("principled", {"Transmission_Weight": 0.9}, "it has Transmission"),
     ("principled", {"Transmission_Weight": 1.0, "Metallic": 0.5}, "it has Transmission"),
     ("principled", {"Transmission_Weight": 1.0}, "the model of rough glass is darker under lamps"),
     (
@@ -922,7 +970,7 @@ REFUSED = [
         {"Transmission_Weight": 1.0, "Roughness": 0.0, "Specular_IOR_Level": 0.4},
         "it has Specular IOR Level",
     ),
-    ("principled", {"Subsurface_Weight": 0.2}, "it has Subsurface"),
+    ("principled", {"Thin_Film_Thickness": 300.0}, "it has Thin Film"),
     ("glass", {"Roughness": 0.3}, "the model of rough glass is darker under lamps"),
     ("glass", {"Color": (2.0, 1.0, 1.0)}, "Tint of Fresnel Dielectric would be 2, and may be 0 to"),
     # Values outside the range of a model, or of what Blender's formulas are taken for.
@@ -944,6 +992,7 @@ TWO_LINKS = [
     ({}, ("Specular IOR Level", "Specular Tint"), "Level and Specular Tint are linked, and only"),
     ({"Roughness": 0.0}, ("Specular IOR Level",), "Level is linked, and converts only as one"),
     ({"Roughness": 0.0}, ("Diffuse Roughness",), "Roughness is linked, and converts only as one"),
+    ({"Subsurface_Weight": 0.5}, ("Specular IOR Level",), "Level is linked, and converts only as"),
     ({"Metallic": 1.0}, ("Specular Tint",), "Tint is linked, and converts only as one value"),
     ({"Metallic": 0.5}, ("Specular Tint",), "Tint is linked, and converts only as one value"),
 ]

@@ -20,6 +20,12 @@ STATES = {
         "principled",
         {"Roughness": 0.4, "Coat_Weight": 0.7, "Coat_Roughness": 0.2, "Sheen_Weight": 0.6},
     ),
+    "skin": (
+        "principled",
+        {"Roughness": 0.4, "Subsurface_Weight": 0.7, "Subsurface_Scale": 0.3},
+    ),
+    "polished skin": ("principled", {"Roughness": 0.0, "Subsurface_Weight": 0.7}),
+    "half glass": ("principled", {"Roughness": 0.3, "Transmission_Weight": 0.6}),
     "metal": ("principled", {"Roughness": 0.5, "Metallic": 1.0, "Anisotropic": 0.7}),
     "matte": ("principled", {"IOR": 1.0, "Anisotropic": 0.5}),
     "clear": ("principled", {"Roughness": 0.0, "Transmission_Weight": 1.0, "Base_Color": (1,) * 3}),
@@ -29,11 +35,20 @@ STATES = {
 NUMBERS = (-1.2, 0.0, 0.3, 1.8)
 COLORS = ((0.8, 0.3, 0.1, 1.0), (0.02, 0.05, 0.1, 1.0))
 VECTORS = ((0.3, -0.8, 0.5),)
-#: Inputs of effects that are off in most states. They are set in one state alone.
+#: Inputs of effects that are off in most states; and those that are set in one state, where others
+#: are set in `plastic` alone.
 EFFECTS = ("Subsurface ", "Coat ", "Sheen ", "Thin Film ")
+OF_EFFECTS = {
+    "covered": ("Coat ", "Sheen "),
+    "skin": ("Subsurface ", "Base Color", "Roughness", "IOR", "Specular ", "Metallic", "Normal"),
+    "polished skin": ("Subsurface ", "Base Color", "IOR"),
+}
 #: States in which most inputs count, so most materials differ after conversion. They are shown
 #: without Open Shading Language, which would compile each of them; that doubled the test's time.
-MANY = ("plastic", "polished plastic", "covered", "metal", "glowing")
+MANY = (
+    *("plastic", "polished plastic", "covered", "skin", "polished skin", "half glass"),
+    *("metal", "glowing"),
+)
 #: Pixels across a ball with its margin, samples of each, and balls in a row of a picture.
 PIXELS, SAMPLES, ROW = 16, 64, 12
 
@@ -79,11 +94,10 @@ def cases(state):
         return node
 
     for index, socket in enumerate(add("as it is").inputs):
-        is_effect = socket.name.startswith(EFFECTS)
-        if state == "covered":
-            counts = socket.name.startswith(("Coat ", "Sheen "))
+        if state in OF_EFFECTS:
+            counts = socket.name.startswith(OF_EFFECTS[state])
         else:
-            counts = state == "plastic" or not is_effect
+            counts = state == "plastic" or not socket.name.startswith(EFFECTS)
         if not socket.enabled or not counts:
             continue
         for value in values_of(socket):

@@ -108,7 +108,7 @@ def test_the_warning_is_of_what_is_converted_with_the_setting(extension, convert
     empty.cycles.shading_system = False
     assert ask(plans, empty) is None
     empty.cycles.shading_system = True
-    node.inputs["Transmission Weight"].default_value = 0.5
+    node.inputs["Thin Film Thickness"].default_value = 300
     assert ask(extension.api.plan_conversion([material]), empty) is None
 
 
