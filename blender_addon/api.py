@@ -449,8 +449,8 @@ def update_materials():
 
 
 def plan_conversion(materials, limit=convert.LIMIT):
-    """Finds the nearest model for each visible Diffuse, Glossy, Principled or Glass node, also of
-    those in node groups, whose plans name the `others`, the materials that change as well.
+    """Finds the nearest model for each visible Diffuse, Glossy, Metallic, Principled or Glass node,
+    also of those in node groups, whose plans name the `others`, the materials that change as well.
 
     Returns [convert.Plan]; line() describes a plan in words. A plan has the model, its values and
     the fraction of the light that the replacement misplaces; or, where no model comes within

@@ -29,6 +29,7 @@ KINDS = {
     "ShaderNodeBsdfAnisotropic": "glossy",
     "ShaderNodeBsdfPrincipled": "principled",
     "ShaderNodeBsdfGlass": "glass",
+    "ShaderNodeBsdfMetallic": "metallic",
 }
 #: Nodes that stay beside models, as they do what models can't. Cycles shows nothing of a volume's
 #: node in a surface, where importers put one.
@@ -50,6 +51,10 @@ KNOWN_SOCKETS = {
         *("Color", "Roughness", "IOR", "Normal", "Weight"),
         *("Thin Film Thickness", "Thin Film IOR"),
     },
+    "metallic": {
+        *("Base Color", "Edge Tint", "Roughness", "Anisotropy", "Rotation", "Normal", "Tangent"),
+        *("Weight", "IOR", "Extinction", "Thin Film Thickness", "Thin Film IOR"),
+    },
     "principled": {
         *_OFF,
         *("Base Color", "Metallic", "Roughness", "IOR", "Alpha", "Normal", "Weight"),
@@ -62,7 +67,7 @@ KNOWN_SOCKETS = {
     },
 }
 #: The settings of nodes that the conversion understands.
-_KNOWN_SETTINGS = {"distribution", "subsurface_method"}
+_KNOWN_SETTINGS = {"distribution", "subsurface_method", "fresnel_type"}
 
 
 #: Sockets to which importers and material generators often link an image of a single colour.
@@ -109,6 +114,11 @@ class Inputs:
 
     def __contains__(self, name):
         return name in self._node.inputs
+
+    @property
+    def kind(self):
+        """The kind of the node, a value of KINDS."""
+        return KINDS[self._node.bl_idname]
 
     def moves(self, name):
         """Whether a socket has a value of its own that is animated or driven: it can be moved."""
@@ -236,17 +246,24 @@ def check_off(inputs):
 def given_of(node, inputs):
     """What all Natives of a node have in common, what they differ in, and what others differ in of
     which the error is computed too: at the ends of inputs that vary."""
-    kind = KINDS[node.bl_idname]
+    kind = inputs.kind
     inputs.setting("mute")
+    if kind == "metallic" and inputs.setting("fresnel_type") != "F82":
+        raise Refused(say("its metal is given by IOR and Extinction"))
     inputs.check_unknown(KNOWN_SOCKETS[kind])
     given, bases = {"kind": kind, "color": inputs.colors(color_of(kind))[0]}, (0.0,)
-    if kind in ("glossy", "principled"):
+    if kind in ANISOTROPY:
         distribution = inputs.setting("distribution")
         if distribution not in ("GGX", "MULTI_GGX", "BECKMANN"):
             name = node.bl_rna.properties["distribution"].enum_items[distribution].name
             raise Refused(say("its distribution is {kind}", kind=Sentence(name)))
         given["beckmann"] = distribution == "BECKMANN"
         given["multiscatter"] = distribution == "MULTI_GGX"
+    if kind == "metallic":
+        # The same as a Principled node that is metal all over.
+        check_off(inputs)
+        tint = tuple(max(c, 0.0) for c in inputs.value("Edge Tint"))
+        given |= {"kind": "principled", "metallic": 1.0, "tint": tint}
     if kind == "principled":
         check_off(inputs)
         metallic = 0.5 if (known := inputs.mean("Metallic")) is None else known
@@ -262,7 +279,7 @@ def given_of(node, inputs):
         given["tint"] = tuple(max(c, 0.0) for c in tint)
     roughnesses = roughnesses_of(inputs, "Roughness")
     stretches = (1.0,)
-    if kind in ("glossy", "principled") and not is_mirror(roughnesses):
+    if kind in ANISOTROPY and not is_mirror(roughnesses):
         stretches = _stretches(inputs, kind)
     count = max(len(roughnesses), len(stretches), len(bases))
     looks = {"roughness": roughnesses, "stretch": stretches, "diffuse_roughness": bases}
@@ -344,7 +361,7 @@ def is_mirror(roughnesses):
 
 
 def color_of(kind):
-    return "Base Color" if kind == "principled" else "Color"
+    return "Base Color" if kind in ("principled", "metallic") else "Color"
 
 
 def natives(node):
@@ -357,24 +374,26 @@ def natives(node):
 #: Sockets of the anisotropy and of its rotation, by kind of node.
 ANISOTROPY = {
     "glossy": ("Anisotropy", "Rotation"),
+    "metallic": ("Anisotropy", "Rotation"),
     "principled": ("Anisotropic", "Anisotropic Rotation"),
 }
-#: The square of the ratio of a Principled node's widths, across and along the tangent, is
-#: 1 + RATIO * anisotropy.
+#: The square of the ratio of the widths of a Principled or Metallic node, across and along the
+#: tangent, is 1 + RATIO * anisotropy.
 RATIO = -0.9
 #: Cycles clamps the Anisotropy of a Glossy node to this, and to its negative.
 _MOST_GLOSSY = 0.99
 
 
 def _stretch_of(anisotropic):
-    """Ratio of the lobe's width along the tangent to that across it, of a Principled node."""
+    """Ratio of the lobe's width along the tangent to that across it, of a Principled or Metallic
+    node."""
     return 1 / (1 + RATIO * min(max(anisotropic, 0.0), 1.0))
 
 
 def _stretches(inputs, kind):
     """Ratio of the lobe's width along the tangent to that across it, or several."""
     name, rotation = ANISOTROPY[kind]
-    if kind == "principled" and inputs.follows(name):
+    if kind != "glossy" and inputs.follows(name):
         found = _ANISOTROPIES
     else:
         found = (inputs.value(name),)
@@ -388,7 +407,7 @@ def _stretches(inputs, kind):
                 "{socket} is a group input that is not linked everywhere", socket=Sentence(socket)
             )
             raise Refused(said)
-    if kind == "principled":
+    if kind != "glossy":
         return tuple(_stretch_of(a) for a in found)
     found = tuple(min(max(a, -_MOST_GLOSSY), _MOST_GLOSSY) for a in found)
     return tuple((1 - a) ** 2 if a > 0 else 1 / (1 + a) ** 2 for a in found)

@@ -143,7 +143,7 @@ def _shown(without_osl):
 def _widths(inputs, native, width, factor):
     """Part.widths of a fit; `native`: the first Native of the fit."""
     rough = _follows_roughness(inputs, native)
-    stretched = native.kind == "principled" and inputs.follows(ANISOTROPY["principled"][0])
+    stretched = native.kind == "principled" and inputs.follows(ANISOTROPY[inputs.kind][0])
     if not rough and not stretched:
         return
     if not rough:
@@ -248,36 +248,38 @@ _PLAIN = {
     "color": ((0.5, 0.5, 0.5), ""),
     "tint": ((1.0, 1.0, 1.0), "Specular Tint"),
     "diffuse_roughness": (0.0, "Diffuse Roughness"),
-    "stretch": (1.0, "Anisotropic"),
+    "stretch": (1.0, ""),
     "f0": (0.04, "IOR"),
     "metallic": (0.0, "Metallic"),
     "roughness": (0.5, "Roughness"),
 }
 
 
-def _cause(given, looks, error, error_without):
+def _cause(kind, given, looks, error, error_without):
     """The name of the socket that makes an error large: as in a new node, it would at least halve
-    the error. "" if there is none."""
+    the error. "" if there is none. `kind`: that of the node."""
     new = _PLAIN | ({"roughness": (0.0, "Roughness")} if given["kind"] == "diffuse" else {})
     for name, (value, socket) in new.items():
         had = {given.get(name, value), *(look.get(name, value) for look in looks)}
         if had != {value} and error_without(**{name: value}) < 0.5 * error:
-            is_turn = name == "stretch" and given["kind"] == "glossy"
-            return ANISOTROPY["glossy"][0] if is_turn else socket or color_of(given["kind"])
+            if name == "stretch":
+                return ANISOTROPY[kind][0]
+            is_edge = name == "tint" and kind == "metallic"
+            return "Edge Tint" if is_edge else socket or color_of(kind)
     return ""
 
 
 def _plan_node(material, node, inputs):
-    if KINDS[node.bl_idname] == "glass":
+    if inputs.kind == "glass":
         return _plan_glass(material, node, inputs)
-    if KINDS[node.bl_idname] == "principled" and _is_clear(inputs):
+    if inputs.kind == "principled" and _is_clear(inputs):
         return _plan_clear(material, node, inputs)
     given, looks, ends = given_of(node, inputs)
-    color = color_of(given["kind"])
+    color = color_of(inputs.kind)
     _, colors = inputs.colors(color)
 
     has = _shown(device.lacks_osl(lamps.current_scene()))
-    is_principled = given["kind"] == "principled"
+    is_principled = inputs.kind == "principled"
     varying = varying_of(inputs) if is_principled else None
     subsurface = subsurface_of(inputs) if is_principled else 0.0
 
@@ -330,7 +332,9 @@ def _plan_node(material, node, inputs):
         blurred = any(is_filtered(Native(**given, **look)) for look in looks)
         models = (one for one in (part, more.get("metal")) if one)
         more |= {"filtered": blurred and not all(map(_is_closure, models))}
-        cause = functools.cache(functools.partial(_cause, given, looks, max(errors), error_without))
+        cause = functools.cache(
+            functools.partial(_cause, inputs.kind, given, looks, max(errors), error_without)
+        )
         return Plan(**vars(part), **more, cause=cause)
 
     if not is_principled:
@@ -368,9 +372,9 @@ def _plan_node(material, node, inputs):
 
 
 def plan(materials):
-    """A Plan for each visible Diffuse, Glossy, Principled or Glass node of these materials, also of
-    those in node groups, once each. Refused are other reflecting nodes, and group nodes with one of
-    the four inside if their groups are linked from another file."""
+    """A Plan for each visible Diffuse, Glossy, Metallic, Principled or Glass node of these
+    materials, also of those in node groups, once each. Refused are other reflecting nodes, and
+    group nodes with one of the five inside if their groups are linked from another file."""
     plans, instances, readers = {}, Instances(), animation.Readers()
     for material in materials:
         for node in _convertible(material):
@@ -385,7 +389,9 @@ def plan(materials):
                 if getattr(node, "node_tree", None) is not None:
                     raise Refused(editable.refusal(node.node_tree))
                 if node.bl_idname not in KINDS:
-                    raise Refused(say("only Principled, Glossy, Diffuse and Glass nodes convert"))
+                    raise Refused(
+                        say("only Principled, Glossy, Metallic, Diffuse and Glass nodes convert")
+                    )
                 withins = [instance.within for instance in instances.of(node)]
                 inputs = Inputs(node, withins)
                 made = _plan_node(material, node, inputs)

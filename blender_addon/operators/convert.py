@@ -23,7 +23,7 @@ class BRDFC_OT_convert(Operator):
     bl_idname = "brdfc.convert"
     bl_label = "Convert to Reflection Models"
     bl_description = (
-        "Replace each Principled, Glossy, Diffuse or Glass node of the selected objects' "
+        "Replace each Principled, Glossy, Metallic, Diffuse or Glass node of the selected objects' "
         "materials by the nearest model. Links stay, and the nodes can be restored"
     )
     bl_options = {"REGISTER", "UNDO"}
@@ -54,7 +54,9 @@ class BRDFC_OT_convert(Operator):
         except ERRORS as error:
             return refused(self, error)
         if not self._plans:
-            none = say("No selected material shows a Principled, Glossy, Diffuse or Glass node")
+            none = say(
+                "No selected material shows a Principled, Glossy, Metallic, Diffuse or Glass node"
+            )
             return refused(self, ValueError(none))
         return context.window_manager.invoke_props_dialog(self, width=600)
 

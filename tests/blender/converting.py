@@ -11,6 +11,7 @@ KINDS = {
     "glossy": "ShaderNodeBsdfAnisotropic",
     "principled": "ShaderNodeBsdfPrincipled",
     "glass": "ShaderNodeBsdfGlass",
+    "metallic": "ShaderNodeBsdfMetallic",
 }
 
 

@@ -813,6 +813,29 @@ def test_subsurface_scattering_and_transmission_stay_blenders_own(extension, con
     assert len(material.node_tree.nodes) == count and node.outputs[0].is_linked
 
 
+@pytest.mark.parametrize("distribution", ["GGX", "MULTI_GGX"])
+def test_a_metallic_node_becomes_what_a_metal_does(extension, convert, distribution):
+    shared = {"Base_Color": (0.8, 0.5, 0.3), "Roughness": 0.4}
+    white = (1.0, 1.0, 1.0)
+    metallic, node = material_of(
+        "metallic", distribution, **shared, Anisotropy=0.5, Edge_Tint=white
+    )
+    metal, _ = material_of("principled", distribution, **shared, Metallic=1.0, Anisotropic=0.5)
+    made, wanted = (only(convert.plan([m])) for m in (metallic, metal))
+    assert (made.model, made.values, made.error) == (wanted.model, wanted.values, wanted.error)
+    node.inputs["Edge Tint"].default_value = (0.5, 0.5, 0.5, 1.0)
+    assert only(convert.plan([metallic])).values["tint"] != wanted.values["tint"]
+    node.inputs["Edge Tint"].default_value = (*white, 1.0)
+    linked(metallic, node, "Anisotropy", "ShaderNodeTexNoise")
+    linked(metallic, node, "Base Color")
+    plan = only(extension.api.plan_conversion([metallic]))
+    assert set(plan.kept) >= {"Anisotropy", "Rotation", "Base Color"}
+    assert extension.api.convert_materials([plan]) == 1
+    assert convert.restore(metallic) == 1 and node.outputs[0].is_linked
+    node.fresnel_type = "PHYSICAL_CONDUCTOR"
+    assert only(convert.plan([metallic])).refusal == "its metal is given by IOR and Extinction"
+
+
 def test_metal_neither_scatters_nor_transmits(extension, convert):
     inputs = {"Metallic": 1.0, "Subsurface_Weight": 0.7, "Transmission_Weight": 0.4}
     material, _ = material_of("principled", "GGX", **inputs)
@@ -1581,9 +1604,7 @@ def test_a_thin_wall_is_refused_by_name(convert):
     assert only(convert.plan([material])).refusal == "it has Thin Wall"
 
 
-@pytest.mark.parametrize(
-    "kind", ["Metallic", "Translucent", "Toon", "Sheen", "Refraction", "RayPortal"]
-)
+@pytest.mark.parametrize("kind", ["Translucent", "Toon", "Sheen", "Refraction", "RayPortal"])
 def test_other_shaders_stay_and_are_said(convert, kind):
     material, node = material_of("principled")
     tree = material.node_tree
@@ -1595,7 +1616,9 @@ def test_other_shaders_stay_and_are_said(convert, kind):
     plans = {plan.node: plan for plan in convert.plan([material])}
     assert set(plans) == {node, other}, "what only mixes is not named"
     assert not plans[node].refusal
-    assert plans[other].refusal == "only Principled, Glossy, Diffuse and Glass nodes convert"
+    assert plans[other].refusal == (
+        "only Principled, Glossy, Metallic, Diffuse and Glass nodes convert"
+    )
 
 
 # ---- by the buttons ------------------------------------------------------------------------------

@@ -27,6 +27,8 @@ STATES = {
     "polished skin": ("principled", {"Roughness": 0.0, "Subsurface_Weight": 0.7}),
     "half glass": ("principled", {"Roughness": 0.3, "Transmission_Weight": 0.6}),
     "metal": ("principled", {"Roughness": 0.5, "Metallic": 1.0, "Anisotropic": 0.7}),
+    "metallic": ("metallic", {"Roughness": 0.5, "Anisotropy": 0.7}),
+    "polished metallic": ("metallic", {"Roughness": 0.0, "Edge_Tint": (0.9, 0.7, 0.5)}),
     "matte": ("principled", {"IOR": 1.0, "Anisotropic": 0.5}),
     "clear": ("principled", {"Roughness": 0.0, "Transmission_Weight": 1.0, "Base_Color": (1,) * 3}),
     "glowing": ("principled", {"Emission_Strength": 0.2, "Alpha": 0.6, "Metallic": 0.5}),
@@ -47,7 +49,7 @@ OF_EFFECTS = {
 #: without Open Shading Language, which would compile each of them; that doubled the test's time.
 MANY = (
     *("plastic", "polished plastic", "covered", "skin", "polished skin", "half glass"),
-    *("metal", "glowing"),
+    *("metal", "metallic", "glowing"),
 )
 #: Pixels across a ball with its margin, samples of each, and balls in a row of a picture.
 PIXELS, SAMPLES, ROW = 16, 64, 12
@@ -86,7 +88,7 @@ def link_pattern(tree, socket):
 def cases(state):
     """{words: material} of a state, with each input as it is, set and linked."""
     kind, inputs = STATES[state]
-    distribution = "GGX" if kind in ("glossy", "principled") else None
+    distribution = "GGX" if kind in ("glossy", "principled", "metallic") else None
     found = {}
 
     def add(words):
