@@ -636,18 +636,22 @@ def see_lamps(scene):
 
 
 def warnings(material, scene):
-    """Everything that keeps a material from rendering as its models specify. Changes nothing.
+    """Everything that keeps a material from rendering as its models specify.
 
-    Returns an empty list if the material has no group of this extension.
+    Returns an empty list if the material has no group of this extension. Materials of the form
+    "auto" first follow the settings of the window's scene, as they do before a render.
     """
     enabling.enable()
+    automatic.follow_quietly()
     return checks.warnings(argument_checks.material(material), argument_checks.scene(scene))
 
 
 def scene_warnings(scene):
     """What keeps materials of the file from rendering in a scene, if they need Open Shading
-    Language; and which other parts of the scene Open Shading Language spoils."""
+    Language; and which other parts of the scene Open Shading Language spoils. Materials follow
+    settings first, as for warnings()."""
     enabling.enable()
+    automatic.follow_quietly()
     return checks.of_file(argument_checks.scene(scene))
 
 
@@ -655,7 +659,7 @@ def follow_settings(scene):
     """Adapts materials of the form "auto" to the settings of a scene. Raises CompileError.
 
     The extension does so by itself when a user changes settings, and before each render. A script
-    that changes settings and then asks for warnings() must call this function in between."""
+    needs this function for another scene than the window's."""
     enabling.enable()
     automatic.follow(argument_checks.scene(scene))
 

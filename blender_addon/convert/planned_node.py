@@ -144,7 +144,8 @@ class Plan(Part):
         return self.label
 
     def _percent(self):
-        low, high = map(in_percent, (self.least_error, self.error))
+        # A model that is brighter than the node may misplace more light than that has.
+        low, high = (in_percent(min(error, 1.0)) for error in (self.least_error, self.error))
         return high if low == high else say("{low} to {high}", low=low, high=high)
 
     @property

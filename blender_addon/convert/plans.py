@@ -236,7 +236,7 @@ def _lacking(natives, colors):
             "its nearest model, {model}, which sends {percent} % of the light in other directions "
             "than the node, needs Open Shading Language for its values",
             model=pack.model(fit.candidate.model).label,
-            percent=in_percent(max(errors_of(all_found(fit)))),
+            percent=in_percent(min(max(errors_of(all_found(fit))), 1.0)),
         )
     models = dict.fromkeys(c.model for c in candidates(natives[0]))
     return say("this extension lacks the models that are near: {models}", models=", ".join(models))

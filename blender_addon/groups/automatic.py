@@ -49,7 +49,8 @@ def follow(scene=None):
         _busy = False
 
 
-def _quietly(scene=None):
+def follow_quietly(scene=None):
+    """The same; prints an error instead of raising it."""
     try:
         follow(scene)
     except RuntimeError as error:  # CompileError, PackError: materials stay as they are
@@ -59,28 +60,28 @@ def _quietly(scene=None):
 @persistent
 def _after_update(scene, _depsgraph):
     if _rendering is None and not _busy and scene == lamps.current_scene():
-        _quietly(scene)
+        follow_quietly(scene)
 
 
 @persistent
 def _after_frame(scene, _depsgraph):
     """Lamps may be shown from this frame on."""
     if scene.session_uid == _rendering or scene == lamps.current_scene():
-        _quietly(scene)
+        follow_quietly(scene)
 
 
 @persistent
 def _before_render(scene, *_):
     global _rendering
     _rendering = scene.session_uid
-    _quietly(scene)
+    follow_quietly(scene)
 
 
 @persistent
 def _before_bake(*_):
     """Baking textures calls no other handler."""
     if _rendering is None:
-        _quietly()
+        follow_quietly()
 
 
 @persistent
@@ -88,7 +89,7 @@ def _now(*_):
     """After a file was loaded, and after a render."""
     global _rendering
     _rendering = None
-    _quietly()
+    follow_quietly()
 
 
 @persistent

@@ -1000,6 +1000,9 @@ REFUSED = [
     ("glass", {"IOR": 0.0}, "IOR of Fresnel Dielectric would be 0, and may be 0.1 to 10"),
     ("glass", {"IOR": 12.0}, "IOR of Fresnel Dielectric would be 12, and may be 0.1 to 10"),
     ("principled", {"IOR": 0.7}, "its IOR is below 1"),
+    # glTF's importer sets this for specular and glossiness.
+    ("principled", {"IOR": 1000.0}, "it reflects 100 % at normal incidence, and converts with up"),
+    ("principled", {"IOR": 4.0, "Specular_IOR_Level": 1.0}, "it reflects 72 % at normal incidence"),
 ]
 
 

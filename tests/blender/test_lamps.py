@@ -54,6 +54,55 @@ def add_lamp(scene, kind, name=None, location=(0, 0, 4), turn=(0.3, -0.5, 0.9), 
     return helpers.add_lamp(scene, kind, name or kind, location, turn, **settings)
 
 
+@pytest.fixture(scope="module")
+def studio(extension, tmp_path_factory):
+    """A file with a ball and two lamps, one of which has a parent. A collection has both kinds."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    scene = bpy.context.scene
+    ball = helpers.add_sphere(scene, extension.api.new_material("ward"), segments=8)
+    ball.name, ball.active_material.name = "Studio Ball", "Studio Metal"
+    key, rim = (add_lamp(scene, "POINT", f"Studio {name}") for name in ("Key", "Rim"))
+    rim.parent = bpy.data.objects.new("Studio Rig", None)
+    scene.collection.objects.link(rim.parent)
+    for name, objects in (("Alone", [ball]), ("Lit", [ball, key])):
+        collection = bpy.data.collections.new(name)
+        scene.collection.children.link(collection)
+        for one in objects:
+            collection.objects.link(one)
+    assert [lamp.slot for lamp in extension.api.see_lamps(scene)] == [1, 2]
+    path = tmp_path_factory.mktemp("studio") / "studio.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+@pytest.mark.parametrize("osl", [False, True])
+@pytest.mark.parametrize(
+    ("kind", "name", "wanted"),
+    [
+        ("Material", "Studio Metal", []),
+        ("Object", "Studio Ball", ["Studio Ball"]),
+        ("Object", "Studio Key", ["Studio Key"]),
+        ("Collection", "Alone", ["Studio Ball"]),
+        ("Collection", "Lit", ["Studio Ball", "Studio Key"]),
+    ],
+)
+def test_what_is_appended_brings_no_lamps_but_those_asked_for(
+    extension, studio, empty, kind, name, wanted, osl
+):
+    empty.cycles.shading_system = osl
+    own = add_lamp(empty, "POINT", "Own")
+    helpers.add_sphere(empty, extension.api.new_material("ward"), segments=8)
+    had, lights = set(bpy.data.objects), len(bpy.data.lights)
+    for _ in range(2):
+        bpy.ops.wm.append(directory=f"{studio}/{kind}/", filename=name)
+    found = [block.name.split(".")[0] for block in bpy.data.objects if block not in had]
+    assert sorted(found) == sorted(2 * wanted)
+    keys = 2 * wanted.count("Studio Key")
+    assert len(bpy.data.lights) == lights + keys
+    aimed_at = [lamp for lamp in extension.api.see_lamps(empty) if lamp.slot]
+    assert len(aimed_at) == 1 + keys and own.name in [lamp.name for lamp in aimed_at]
+
+
 def slots(scene, update=True):
     """The twelve numbers of each filled slot, as Cycles gets them from the evaluated group, without
     what codes() returns."""

@@ -746,6 +746,20 @@ def test_choices_of_automatic_materials(extension, empty):
     assert abs(seen[2] / seen[0] - 1) > 0.1
 
 
+def test_warnings_are_of_settings_that_a_script_has_changed(extension, empty):
+    empty.render.engine = "CYCLES"
+    extension.api.enable_osl(empty)
+    material = extension.api.new_material("ward")
+    add_sphere(empty, material, segments=8)
+    for osl in (False, True, False):
+        empty.cycles.shading_system = osl
+        before = [finding.code for finding in extension.api.warnings(material, empty)]
+        extension.api.follow_settings(empty)
+        after = [finding.code for finding in extension.api.warnings(material, empty)]
+        assert before == after and "osl_off" not in after
+        assert "osl_off" not in [finding.code for finding in extension.api.scene_warnings(empty)]
+
+
 @pytest.mark.parametrize("model", ["ashikhmin_shirley", "glossy_specular", "ward"])
 def test_sockets_do_not_depend_on_how_a_group_began(extension, model):
     """A group that was made with OSL off and then filled for OSL equals one made with OSL on;
