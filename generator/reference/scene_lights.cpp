@@ -34,6 +34,14 @@ void note_negative(SceneFiles& files, const Image& image, const std::string& nam
                            first / image.width, least));
 }
 
+/// Turns an equirectangular picture about z, counterclockwise seen from above, by whole texels.
+void turn(Image& image, double degrees) {
+  const double turns = degrees / 360 - std::floor(degrees / 360);
+  const auto shift = std::lround(turns * image.width) % image.width;
+  for (int y = 0; y < image.height; ++y)
+    std::rotate(image.pixel(0, y), image.pixel(0, y) + 3 * shift, image.pixel(0, y) + 3 * image.width);
+}
+
 }  // namespace
 
 void read_light(const JsonView& j, SceneFiles& files) {
@@ -116,15 +124,16 @@ void read_environment(const std::optional<JsonView>& j, SceneFiles& files) {
   if (j && (j->has("image") || j->has("procedural"))) {
     Image image;
     if (j->has("image")) {
-      j->only({"image", "colorspace", "strength"});
+      j->only({"image", "colorspace", "rotate_degrees", "strength"});
       image = files.read_picture(j->at("image"), files.read_colorspace(*j));
       note_negative(files, image, files.beside(j->at("image").text()).string());
     } else {
-      j->only({"procedural", "width", "strength"});
+      j->only({"procedural", "width", "rotate_degrees", "strength"});
       const std::string name = j->at("procedural").choice({"sky", "interior", "checker"});
       const auto width = j->find("width");
       image = procedural_environment(name, width ? width->integer(4, 16384) / 2 * 2 : 1024);
     }
+    if (const auto v = j->find("rotate_degrees")) turn(image, v->number(-3600, 3600));
     std::string name;
     e.image = files.keep(std::move(image), name);
     e.strength = strength;

@@ -262,6 +262,22 @@ TEST_F(SceneTest, ResolvedSceneIsTheSame) {
     EXPECT_EQ(contents(entry.path()), contents(folder_ / "again" / entry.path().filename())) << entry.path();
 }
 
+TEST_F(SceneTest, AnEnvironmentIsTurnedCounterclockwise) {
+  json scene = valid();
+  const auto image_at = [&](double degrees) {
+    scene["environment"] = {{"procedural", "interior"}, {"width", 16}, {"rotate_degrees", degrees}};
+    return *load_scene(write(scene.dump())).environment.image;
+  };
+  const Image before = image_at(0), after = image_at(90), back = image_at(-270), nearly = image_at(-359.9);
+  EXPECT_EQ(after.rgb, back.rgb);
+  EXPECT_EQ(before.rgb, nearly.rgb);
+  // What lay towards +x, in the middle of the picture, lies towards +y, a quarter of the width to the left.
+  for (int y = 0; y < 8; ++y)
+    for (int x = 0; x < 16; ++x)
+      for (int c = 0; c < 3; ++c) ASSERT_EQ(after.pixel(x, y)[c], before.pixel((x + 4) % 16, y)[c]);
+  EXPECT_NE(before.rgb, after.rgb);
+}
+
 TEST_F(SceneTest, HashSeesContentsNotSettings) {
   const std::string hash = load_scene(write(valid().dump())).hash;
   EXPECT_EQ(hash.size(), 16u);
