@@ -21,6 +21,13 @@ template <class T> T power_lobe(const T& e, const Vec3<T>& a, const Vec3<T>& b) 
   return named("lobe", select(cosAlpha > T(0), exp(e * log_cos), T(0)));
 }
 
+/// The same about the normal, computed from 1 - cos^2 alpha, for h above the surface.
+template <class T> T polar_power(const T& e, const Vec3<T>& h) {
+  const T s2 = named("sin2_h", sin2_theta(h));
+  const T near_pole = T(0.5) * log1p(-minimum(s2, T(0.75))), near_horizon = log(maximum(h.z, tiny<T>()));
+  return exp(e * select(s2 < T(0.5), near_pole, near_horizon));
+}
+
 /// The pdf of sample_power_lobe().
 template <class T> T power_lobe_pdf(const T& e, const Vec3<T>& axis, const Vec3<T>& w) {
   return (e + T(1)) / (T(2) * pi<T>()) * power_lobe(e, axis, w);

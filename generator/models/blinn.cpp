@@ -7,8 +7,6 @@
 // The paper leaves the normalisation of D open (its D is 1 at h = n) and includes all constants in k_s. Here D (n.h)
 // integrates to 1, and the factor 1/4 is the Jacobian of reflection. So k_s = F is a reflectance, and with k_s = 1 the
 // only loss is the light that the cavities block.
-//
-// Numerical stability: (n.h)^e is computed from 1 - (n.h)^2 = h_x^2 + h_y^2, which is precise near the normal.
 #include "model/base_terms.h"
 #include "model/power_lobe.h"
 #include "model/under.h"
@@ -40,11 +38,7 @@ template <class T> struct Blinn {
              .by_factors());
   }
 
-  T D(const Vec3<T>& h) const {
-    const T s2 = named("sin2_h", sin2_theta(h));
-    const T near_pole = T(0.5) * log1p(-minimum(s2, T(0.75))), near_horizon = log(maximum(h.z, tiny<T>()));
-    return named("D", (e + T(2)) / (T(2) * pi<T>()) * exp(e * select(s2 < T(0.5), near_pole, near_horizon)));
-  }
+  T D(const Vec3<T>& h) const { return named("D", (e + T(2)) / (T(2) * pi<T>()) * polar_power(e, h)); }
 
   Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
     const HalfVector<T> k(wi, wo);

@@ -82,6 +82,8 @@ CASES = [
     pytest.param("phong", {"e": 100.0}, marks=SLOW),
     pytest.param("radziszewski_alda", {"n": 4.0}, marks=SLOW),
     pytest.param("schlick", {}, marks=SLOW),
+    pytest.param("shaped_facets", {"masking": "neumann"}, marks=SLOW),
+    pytest.param("shaped_facets", {"alpha": 0.3, "distribution": "exponential"}, marks=SLOW),
     ("thin_film", {"ax": 0.3, "ay": 0.2, "film_ior": 2.0}),
 ]
 

@@ -27,8 +27,9 @@ std::vector<ParamValues> cases_of(const ModelInfo& info) {
 
 /// Facets with another masking, or closures of another shape: their light beyond the model's is judged as a whole.
 bool exceeds_a_little(const std::string& name) {
-  static const std::set<std::string> names = {
-      "blinn", "cook_torrance", "disney", "disney_diffuse", "glossy_reflector", "microfacet", "phong_material", "ward"};
+  static const std::set<std::string> names = {"blinn",          "cook_torrance",    "disney",
+                                              "disney_diffuse", "glossy_reflector", "microfacet",
+                                              "phong_material", "shaped_facets",    "ward"};
   return names.count(name) == 1;
 }
 
@@ -119,6 +120,13 @@ const UnderRow kUnderRows[] = {{"ashikhmin_shirley", {"rs=0,0,0"}, 0.9},
                                {"schlick", {}, 0.75},
                                {"schlick", {"rough=0.9"}, 0.7},
                                {"schlick_double", {}, 0.9},
+                               {"shaped_facets", {}, 0.35},
+                               {"shaped_facets", {"gamma=4"}, 0.73},
+                               {"shaped_facets", {"masking=kelemen", "gamma=4"}, 0.74},
+                               {"shaped_facets", {"masking=ashikhmin_premoze", "gamma=4"}, 0.65},
+                               {"shaped_facets", {"masking=neumann", "gamma=4"}, 0.67},
+                               {"shaped_facets", {"distribution=blinn_phong"}, 0.9},
+                               {"shaped_facets", {"distribution=exponential"}, 0.56},
                                {"ward", {}, 0.8},
                                {"ward", {"normalisation=duer", "ax=0.3"}, 0.7}};
 

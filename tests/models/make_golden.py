@@ -869,6 +869,55 @@ def micro_albedo(p, cos_o):
     return [found * more] * 3
 
 
+# ---- Microfacets of other shapes: Burley 2012, Holzschuch and Pacanowski 2017 -------------------
+
+
+def shaped_d(p, hn, maths=mp, number=mp.mpf):
+    a, g = number(p["alpha"]), number(p["gamma"])
+    if p["distribution"] == "blinn_phong":
+        e = 2 / a**2 - 2
+        return (e + 2) / (2 * maths.pi) * hn**e
+    if p["distribution"] == "exponential":
+        slope = maths.sqrt(1 - hn**2) / hn
+        return maths.exp(-slope / a) / (2 * maths.pi * a**2 * hn**4)
+    if a == 1:
+        return 1 / maths.pi + 0 * hn  # the limit
+    if g == 1:
+        c = (a**2 - 1) / (maths.pi * maths.log(a**2))
+    else:
+        c = (g - 1) * (a**2 - 1) / (maths.pi * (1 - a ** (2 - 2 * g)))
+    return c / (1 + (a**2 - 1) * hn**2) ** g
+
+
+def shaped_g(p, hn, oh, ni, no):
+    return {
+        "v_cavity": lambda: cavity(hn, oh, ni, no),
+        "kelemen": lambda: ni * no / oh**2,
+        "ashikhmin_premoze": lambda: ni * no / (ni + no - ni * no),
+        "neumann": lambda: ni * no / max(ni, no),
+    }[p["masking"]]()
+
+
+def shaped_f(p, wi, wo):
+    ki, ko, h, oh = half(wi, wo)
+    shape = shaped_d(p, h[2]) * shaped_g(p, h[2], oh, ki[2], ko[2]) / (4 * ki[2] * ko[2])
+    return [c * shape for c in schlick_fresnel("f0")(p, oh)]
+
+
+def shaped_pdf(p, wi, wo):
+    """D G_1 / (4 (n.o)) with the masking of V-cavities."""
+    _, ko, h, oh = half(wi, wo)
+    return shaped_d(p, h[2]) * min(1, 2 * h[2] * ko[2] / oh) / (4 * ko[2])
+
+
+def shaped_albedo(p, cos_o):
+    def one(p, hn, oh, ni, no, phi):
+        d = shaped_d(p, hn, math, float)
+        return d * shaped_g(p, hn, oh, ni, no) * oh / no * schlick_fresnel("f0")(p, oh)[0]
+
+    return [half_albedo(one, lambda p: p["alpha"])(p, cos_o)] * 3
+
+
 # ---- Belcour and Barla, with the model's Gaussians ---------------------------------------------
 
 #: Centres and width in 1 / um, and weights by working space and channel.
@@ -2009,6 +2058,42 @@ MODELS = {
             {"f0": (1, 1, 1), "masking": "v_cavity"},
             {"f0": (1, 1, 1), "distribution": "beckmann", "ax": 1, "ay": 1},
             {"f0": (1, 1, 1), "distribution": "multiscatter_ggx", "ax": 0.7, "ay": 0.7},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
+    "shaped_facets": dict(
+        f=shaped_f,
+        pdf=shaped_pdf,
+        albedo=shaped_albedo,
+        defaults={
+            "f0": (0.9, 0.6, 0.3),
+            "alpha": 0.1,
+            "gamma": 1.5,
+            "distribution": "gtr",
+            "masking": "v_cavity",
+        },
+        cases=[
+            {},
+            {"gamma": 1, "alpha": 0.02, "masking": "kelemen"},
+            {"gamma": 10, "alpha": 0.7, "masking": "ashikhmin_premoze"},
+            {"gamma": 1, "alpha": 1, "f0": (0, 0.04, 1)},
+            {"gamma": 1.0000001, "alpha": 0.9999999, "masking": "neumann"},
+            {"gamma": 2, "alpha": 1e-4, "masking": "ashikhmin_premoze"},
+            {"distribution": "blinn_phong", "alpha": 0.4, "masking": "kelemen"},
+            {"distribution": "blinn_phong", "alpha": 1, "masking": "neumann"},
+            {"distribution": "blinn_phong", "alpha": 1e-3},
+            {"distribution": "exponential", "masking": "ashikhmin_premoze"},
+            {"distribution": "exponential", "alpha": 1, "masking": "kelemen"},
+            {"distribution": "exponential", "alpha": 0.01, "f0": (0, 0.04, 1)},
+        ],
+        albedo_cases=[
+            {"alpha": 0.3, "f0": (1, 1, 1)},
+            {"alpha": 0.3, "gamma": 1, "f0": (1, 1, 1), "masking": "kelemen"},
+            {"alpha": 0.3, "gamma": 3, "f0": (0.5, 0.5, 0.5), "masking": "ashikhmin_premoze"},
+            {"alpha": 0.3, "f0": (1, 1, 1), "masking": "neumann"},
+            {"distribution": "blinn_phong", "alpha": 0.5, "f0": (1, 1, 1), "masking": "kelemen"},
+            {"distribution": "exponential", "alpha": 0.2, "f0": (1, 1, 1)},
+            {"distribution": "exponential", "alpha": 0.6, "f0": (1, 1, 1), "masking": "neumann"},
         ],
         cosines=[1, 0.5, 0.1],
     ),
