@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Neumann's Phong lobe, "pumped up" by dividing by the larger of both cosines; the predecessor of Ashikhmin and
-// Shirley's model.
+// Neumann's Phong lobe, "pumped up" by dividing by the larger of both cosines, also called the stretched Phong model;
+// the predecessor of Ashikhmin and Shirley's.
 //
 // L. Neumann, A. Neumann, L. Szirmay-Kalos: Compact Metallic Reflectance Models, Computer Graphics Forum 18(3), 1999;
 // quoted as eq. 2 by Ashikhmin and Shirley. f = k_s c cos^e alpha / max(cos theta_i, cos theta_o), where alpha is the

@@ -27,9 +27,9 @@ std::vector<ParamValues> cases_of(const ModelInfo& info) {
 
 /// Facets with another masking, or closures of another shape: their light beyond the model's is judged as a whole.
 bool exceeds_a_little(const std::string& name) {
-  static const std::set<std::string> names = {"blinn",          "cook_torrance",    "disney",
-                                              "disney_diffuse", "glossy_reflector", "microfacet",
-                                              "phong_material", "shaped_facets",    "ward"};
+  static const std::set<std::string> names = {
+      "blinn",   "cook_torrance", "disney",         "disney_diffuse", "glossy_reflector",
+      "kelemen", "microfacet",    "phong_material", "shaped_facets",  "ward"};
   return names.count(name) == 1;
 }
 
@@ -108,6 +108,8 @@ const UnderRow kUnderRows[] = {{"ashikhmin_shirley", {"rs=0,0,0"}, 0.9},
                                {"glossy_reflector", {"e=20", "below=lose"}, 0.94},
                                {"hapke", {}, 0.65},
                                {"hapke", {"b=0", "scattering=single"}, 0.7},
+                               {"kelemen", {}, 0.75},
+                               {"kelemen", {"f0=1", "rm=0"}, 0.5},
                                {"microfacet", {}, 0.999999},
                                {"microfacet", {"f0=0.04", "tint=0.5"}, 0.9},
                                {"microfacet", {"ax=0.5", "ay=0.04"}, 0.9},

@@ -756,6 +756,103 @@ def beckmann_d_fp(p, hn):
     return math.exp(-(1 - hn**2) / hn**2 / m2) / (math.pi * m2 * hn**4)
 
 
+# ---- Kelemen and Szirmay-Kalos 2001, eq. 3 and the matte term of sec. 2.2 ----------------------
+
+#: The model's fit of the light that the facets leave, as it is printed in kelemen.cpp.
+KELEMEN_NARROW = (
+    (0.9405, 0.1647, -0.0597),
+    (-0.716, -0.3393, -0.4891),
+    (-0.4514, 0.4124, 0.5612),
+    (-0.119, 0.5486, 0.8408),
+    (0.7393, 0.2967, -0.0368),
+)
+KELEMEN_WIDE = (0.0929, 1.1378, -0.2484)
+KELEMEN_SOFT = (
+    (0.7353, -0.1328, 0.0581, -0.0509),
+    (-0.0977, -0.1302, 0.0148, 0.0032),
+    (0.0509, -0.1062, -0.045, 0.0944),
+    (0.0591, -0.0706, -0.0982, 0.0811),
+)
+KELEMEN_MEAN_LOSS = (0.777, -0.1358, -0.5334, 0.4383, 0.7772, -0.9694, -0.3448, 0.4958)
+KELEMEN_MEAN_SOFT = (0.8551, -0.2829, -0.2088, 0.0664, 0.0627, -0.0177)
+
+
+def kelemen_rest(p, w):
+    """The two parts of 1 - a: that of F = 1, and that which has the factor 1 - f0."""
+    m, cos, sin = mp.mpf(p["m"]), mp.mpf(w[2]), mp.sqrt(mp.mpf(w[0]) ** 2 + mp.mpf(w[1]) ** 2)
+    tan, c = sin / cos, mp.mpf
+    v, u = 1 / (1 + 2 * m * tan), cos / (cos + m * sin**2)
+    z = (1 + m) * cos / (cos + m)
+    peak = m**2 * (1 - mp.exp(-1 / m**2))
+
+    def sum2(rows, x):
+        powers = [
+            (2 * x - 1) ** i * (2 * m - 1) ** j for i, r in enumerate(rows) for j in range(len(r))
+        ]
+        return sum(
+            c(repr(k)) * q for k, q in zip((k for r in rows for k in r), powers, strict=True)
+        )
+
+    L = v ** c("0.85") * (1 - v) ** 2 * sum2(KELEMEN_NARROW, v)
+    L += peak * u * sum(c(repr(k)) * u**i for i, k in enumerate(KELEMEN_WIDE))
+    mean_cos = cos
+    if m * tan > 0 and (y := 1 / (2 * m * tan)) < 30:
+        erfc = 2 / mp.sqrt(mp.pi) * mp.exp(-(y**2)) / (y + mp.sqrt(y**2 + 4 / mp.pi))
+        mean_cos = cos * (1 - erfc / 2 + mp.exp(-(y**2)) / (2 * y * mp.sqrt(mp.pi)))
+    facing = mean_cos / mp.sqrt(1 + m**2)
+    return L, (1 - (1 - facing) ** 5) * sum2(KELEMEN_SOFT, z)
+
+
+def kelemen_mean(p):
+    m = mp.mpf(p["m"])
+
+    def series(k, x):
+        return sum(mp.mpf(repr(c)) * (2 * x - 1) ** i for i, c in enumerate(k))
+
+    return m**2 * (1 - mp.log(m)) * series(KELEMEN_MEAN_LOSS, mp.cbrt(m)), series(
+        KELEMEN_MEAN_SOFT, mp.sqrt(m)
+    )
+
+
+def kelemen_left(p, parts):
+    return [parts[0] + (1 - mp.mpf(f)) * parts[1] for f in p["f0"]]
+
+
+def kelemen_f(p, wi, wo):
+    ki, ko, h, oh = half(wi, wo)
+    i, o = (kelemen_left(p, kelemen_rest(p, k)) for k in (ki, ko))
+    mean = kelemen_left(p, kelemen_mean(p))
+    facets = beckmann_d(p, h[2]) / (2 * (1 + dot(ki, ko)))
+    return [
+        f * facets + r * a * b / (mp.pi * c)
+        for f, r, a, b, c in zip(schlick_fresnel("f0")(p, oh), p["rm"], i, o, mean, strict=True)
+    ]
+
+
+def kelemen_pdf(p, wi, wo):
+    """Visible normals of V-cavities, or Lambert's cosine."""
+    ki, ko, h, oh = half(wi, wo)
+    left = kelemen_left(p, kelemen_rest(p, ko))
+    glossy = max(mp.mpf("1.01") - x for x in left)
+    share = glossy / (glossy + max(x * r for x, r in zip(left, p["rm"], strict=True)))
+    seen = min(1, 2 * h[2] * ko[2] / oh) * beckmann_d(p, h[2]) / (4 * ko[2])
+    return share * seen + (1 - share) * ki[2] / mp.pi
+
+
+def kelemen_albedo(p, cos_o):
+    def one(p, hn, oh, ni, no, phi):
+        return beckmann_d_fp(p, hn) * ni / oh * (p["f0"][0] + (1 - p["f0"][0]) * (1 - oh) ** 5)
+
+    def left(cos):
+        cos = mp.mpf(cos)
+        return kelemen_left(p, kelemen_rest(p, (mp.sqrt((1 - cos) * (1 + cos)), 0, cos)))[0]
+
+    # The cosine is x^4: what is left is steep at the horizon.
+    mean = mp.quad(lambda x: 8 * x**7 * left(x**4), mp.linspace(0, 1, 9))
+    matte = p["rm"][0] * left(cos_o) * mean / kelemen_left(p, kelemen_mean(p))[0]
+    return [half_albedo(one, lambda p: p["m"])(p, cos_o) + matte] * 3
+
+
 # ---- Microfacets: Walter et al. 2007, Heitz 2014 -----------------------------------------------
 
 
@@ -2022,6 +2119,24 @@ MODELS = {
             {"m": 1, "f0": (1, 1, 1)},
             {"m": 0.3, "f0": (0.04, 0.04, 0.04)},
             {"m": 0.05, "f0": (1, 1, 1)},
+        ],
+        cosines=[1, 0.5, 0.1],
+    ),
+    "kelemen": dict(
+        f=kelemen_f,
+        pdf=kelemen_pdf,
+        albedo=kelemen_albedo,
+        defaults={"f0": (0.05, 0.05, 0.05), "rm": (0.8, 0.8, 0.8), "m": 0.3},
+        cases=[
+            {},
+            {"m": 1, "f0": (1, 1, 1), "rm": (1, 1, 1)},
+            {"m": 0.05, "f0": (0, 0.04, 1), "rm": (0.1, 0.5, 1)},
+            {"m": 1e-3, "rm": (1, 1, 1)},
+        ],
+        albedo_cases=[
+            {"m": 1, "f0": (1, 1, 1), "rm": (0, 0, 0)},
+            {"m": 0.3, "rm": (1, 1, 1)},
+            {"m": 0.05, "f0": (0.5, 0.5, 0.5), "rm": (1, 1, 1)},
         ],
         cosines=[1, 0.5, 0.1],
     ),
