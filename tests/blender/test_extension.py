@@ -752,6 +752,7 @@ def test_only_choices_leave_parameters_unread(extension):
         ("radziszewski_alda", "n_theta"): proportion | {"part": ["product", "latitudinal"]},
         ("radziszewski_alda", "n_phi"): proportion | {"part": ["product", "longitudinal"]},
         ("radziszewski_alda", "ior"): {"around": ["refraction"]},
+        ("shaped_facets", "gamma"): {"distribution": ["gtr"]},
     }
 
 
