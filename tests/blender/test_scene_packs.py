@@ -132,14 +132,14 @@ def values_of(entry):
     return values
 
 
-def has_twin(name, entry, folded, varies):
+def has_twin(name, entry, folded, varies, values):
     """Whether a model has a twin that needs no fit with these materials: its fixed parameters must
     have the same values in all of them."""
     if folded == "all":
         return name in QUICK_TWINS
     forms = entry["representations"].values()
     return all(
-        key not in varies and all(form["only"].get(key, value) == value for form in forms)
+        key not in varies and all(form["only"].get(key, values[key]) == value for form in forms)
         for key, value in entry["representations"]["twin"]["only"].items()
     )
 
@@ -156,7 +156,9 @@ def materials_of(models, folded):
         some = colours | {axis} if axis else {next(iter(values))}
         varies = {"all": set(), "some": some, "none": set(values)}[folded]
         for form, about in entry["representations"].items():
-            if form == "fitted" or (form == "twin" and not has_twin(name, entry, folded, varies)):
+            if form == "fitted" or (
+                form == "twin" and not has_twin(name, entry, folded, varies, values)
+            ):
                 continue
             given = {key: {"varies": True} if key in varies else v for key, v in values.items()}
             made[f"{name} {form}"] = {
