@@ -9,6 +9,11 @@
 
 namespace brdfc::inline model {
 
+/// Schlick's approximation, from the reflectance at normal incidence and 1 - cos theta.
+template <class T> Rgb<T> schlick_fresnel(const Rgb<T>& f0, const T& one_minus_cos) {
+  return f0 + (Rgb<T>(T(1)) - f0) * pow5(one_minus_cos);
+}
+
 /// u, v^2 and |u + i v|^2 of u + i v = sqrt((n + i k)^2 - sin^2). The larger of u^2 and v^2 is computed from the
 /// root, the smaller from u v = n k.
 template <class T> struct ConductorRoot { T u, v2, modulus; };

@@ -11,6 +11,7 @@
 // F is Schlick's approximation with the reflectance f0 at normal incidence. The paper instead solves f0 for a
 // refractive index and uses the Fresnel equations. Schlick's F is linear in f0, as the tables of the albedo require.
 #include "model/base_terms.h"
+#include "model/fresnel.h"
 #include "model/under.h"
 #include "model/v_cavity.h"
 
@@ -48,7 +49,7 @@ template <class T> struct CookTorrance {
     return named("D", exp(-(s.x * s.x + s.y * s.y) / m2) * sqr(s.inverse_cos2()) / (pi<T>() * m2));
   }
 
-  Rgb<T> F(const T& one_minus_oh) const { return named("F", f0 + (Rgb<T>(T(1)) - f0) * pow5(one_minus_oh)); }
+  Rgb<T> F(const T& one_minus_oh) const { return named("F", schlick_fresnel(f0, one_minus_oh)); }
 
   Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
     const HalfVector<T> k(wi, wo);

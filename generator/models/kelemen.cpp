@@ -32,6 +32,7 @@
 // the variance is high, of at most a fifth of the light, from grazing views.
 #include "model/base_terms.h"
 #include "model/facets.h"
+#include "model/fresnel.h"
 #include "model/under.h"
 
 namespace brdfc {
@@ -94,7 +95,7 @@ template <class T> struct Kelemen {
   }
 
   Facets<T> surface() const { return {m, m, true, true}; }
-  Rgb<T> F(const T& one_minus_oh) const { return named("F", f0 + (Rgb<T>(T(1)) - f0) * pow5(one_minus_oh)); }
+  Rgb<T> F(const T& one_minus_oh) const { return named("F", schlick_fresnel(f0, one_minus_oh)); }
 
   /// L at normal incidence.
   T e() const {

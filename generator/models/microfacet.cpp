@@ -25,6 +25,7 @@
 // Numerical stability. With s = 7 (1 - c) / 6, q is 7 c s^6 and 1 - q is (1 - s)^2 (1 + 2 s + ... + 6 s^5).
 #include "model/base_terms.h"
 #include "model/facets.h"
+#include "model/fresnel.h"
 #include "model/under.h"
 #include "model/v_cavity.h"
 
@@ -116,7 +117,7 @@ template <class T> struct Microfacet {
     const T q = named("q", T(7) * (T(1) - one_minus_oh) * s2 * s2 * s2);
     const T rest = T(1) + s * (T(2) + s * (T(3) + s * (T(4) + s * (T(5) + s * T(6)))));
     const T untinted = named("untinted", sqr(T(1) - s) * rest);
-    return named("F", (f0 + (Rgb<T>(T(1)) - f0) * pow5(one_minus_oh)) * (Rgb<T>(untinted) + tint * q));
+    return named("F", schlick_fresnel(f0, one_minus_oh) * (Rgb<T>(untinted) + tint * q));
   }
 
   /// (1 - E) / E: what interreflection of the share 1 adds to f, over f.

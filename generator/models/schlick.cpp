@@ -21,6 +21,7 @@
 // pdf and q = p / (2 pi (p^2 sin^2 + cos^2)), so it is at most their arithmetic mean. That mean is sampled, and weights
 // stay below S.
 #include "model/base_terms.h"
+#include "model/fresnel.h"
 #include "model/half_vector.h"
 #include "model/under.h"
 
@@ -57,7 +58,7 @@ template <class T> struct Schlick {
           .by_factors());
   }
 
-  Rgb<T> S(const T& one_minus_u) const { return named("S", r + (Rgb<T>(T(1)) - r) * pow5(one_minus_u)); }
+  Rgb<T> S(const T& one_minus_u) const { return named("S", schlick_fresnel(r, one_minus_u)); }
 
   T b() const { return named("b", T(4) * rough * (T(1) - rough)); }
   T a() const { return named("a", select(rough < T(0.5), T(0), sqr(T(2) * rough - T(1)))); }

@@ -50,6 +50,7 @@
 // of exponential has the density r exp(-r): the sum of two exponential numbers, whose share of the sum is an
 // independent uniform number, which selects the side of the cavity.
 #include "model/base_terms.h"
+#include "model/fresnel.h"
 #include "model/power_lobe.h"
 #include "model/under.h"
 #include "model/v_cavity.h"
@@ -141,7 +142,7 @@ template <class T> struct ShapedFacets {
     }
   }
 
-  Rgb<T> F(const T& one_minus_oh) const { return named("F", f0 + (Rgb<T>(T(1)) - f0) * pow5(one_minus_oh)); }
+  Rgb<T> F(const T& one_minus_oh) const { return named("F", schlick_fresnel(f0, one_minus_oh)); }
 
   Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
     const HalfVector<T> k(wi, wo);
