@@ -32,28 +32,25 @@ def taken_by(uppers, inputs):
     return tuple(dict.fromkeys(float(1 - share) for share in left))
 
 
+def _with_native(found, shares):
+    """(light, error) of each pair, for each of these shares of the light that stay Blender's own
+    instead of that of the models."""
+    for light, error in found:
+        for share in shares:
+            left = (1 - share) * light
+            yield left + share, left * error / max(left + share, 1e-9)
+
+
 def errors_below(found, taken):
     """The errors of what lies below Uppers, which stay Blender's own, as shares of the light of
     both. `taken`: as taken_by() finds it."""
-    pairs = []
-    for light, error in found:
-        for share in taken:
-            below = (1 - share) * light
-            pairs.append((below + share, below * error / max(below + share, 1e-9)))
-    return errors_of(pairs)
+    return errors_of(_with_native(found, taken))
 
 
 def beside(found, shares):
     """The (light, error) of each colour and roughness, where these shares of it give way to
     Blender's own glass, which loses no light."""
-    return [
-        [
-            ((1 - s) * light + s, (1 - s) * light * error / max((1 - s) * light + s, 1e-9))
-            for light, error in of_color
-            for s in dict.fromkeys(shares)
-        ]
-        for of_color in found
-    ]
+    return [list(_with_native(of_color, dict.fromkeys(shares))) for of_color in found]
 
 
 def all_found(fit):

@@ -71,18 +71,13 @@ def effective_sockets(node, kept):
 
 def _has(inputs, weight):
     """Whether an effect shows, of which a socket is the weight."""
-    if weight not in inputs or not inputs.follows(weight) and inputs.constant(weight) <= 0:
-        return False
-    return True
+    return weight in inputs and (inputs.follows(weight) or inputs.constant(weight) > 0)
 
 
 def uppers_of(inputs):
     """The Uppers of a Principled node."""
-    found = []
-    for weight, upper in (("Sheen Weight", _sheen), ("Coat Weight", _coat)):
-        if _has(inputs, weight):
-            found.append(upper(inputs))
-    return tuple(found)
+    makers = {"Sheen Weight": _sheen, "Coat Weight": _coat}
+    return tuple(upper(inputs) for weight, upper in makers.items() if _has(inputs, weight))
 
 
 def _coat(inputs):

@@ -69,8 +69,7 @@ def _plan_glass(material, node, inputs):
 
 def _is_clear(inputs):
     """Whether a Principled node transmits all light that enters it, as glass does."""
-    name = "Transmission Weight"
-    known = inputs.constant(name) if name in inputs else None
+    known = inputs.constant(TRANSMISSION) if TRANSMISSION in inputs else None
     return known is not None and known >= 1 and inputs.constant("Metallic") == 0
 
 

@@ -4,15 +4,13 @@
 import math
 from dataclasses import dataclass
 
-import bpy
-
-from ..content import group_content
 from ..groups import bump_correction, model_nodes, nodes
 from ..nearest import native_bsdf
 from ..packs import pack
 from ..trees import animation, shader_trees, shader_values
-from .kept_effects import SUBSURFACE, TRANSMISSION, TRANSMISSION_SHARED
-from .node_values import ANISOTROPY, KINDS, RATIO, has_own_animation
+from .effect_nodes import EffectNodes
+from .kept_effects import TRANSMISSION
+from .node_values import ANISOTROPY, KINDS, RATIO
 from .planned_node import HELPS
 
 #: Custom property of a group node: the name of the node that it replaces.
@@ -42,20 +40,13 @@ class PreparedPart:
         return self.values | dict.fromkeys(linked)
 
 
-class Replacement:
+class Replacement(EffectNodes):
     """Replaces the node of a Plan."""
 
     def __init__(self, plan, parts, readers):
         """`readers`: the animation.Readers of the file."""
-        self._plan, self._node, self._tree = plan, plan.node, plan.node.id_data
-        self._readers, self._direct = readers, plan.direct
-        #: The sockets that have taken over the value of one of the replaced node, by its name.
-        self._given = {}
-        self._animated = animation.animated_properties(plan.node)
-        #: The nodes whose output has the animation of a socket of the replaced node, by its name.
-        self._moving = {}
-        #: The output of a Clamp node by socket, once it is made.
-        self._clamps = {}
+        super().__init__(plan)
+        self._readers = readers
         #: The tangent of an anisotropic node, once it is made.
         self._turned = None
         groups = [self._add(prepared) for prepared in parts]
@@ -83,20 +74,6 @@ class Replacement:
             self._tree.links.remove(link)
             self._tree.links.new(shader, target)
         node.location = (node.location.x, node.location.y - 700)
-
-    def _source(self, name):
-        """The output that controls a socket of the node; None if its own value does, which is not
-        animated."""
-        socket = self._node.inputs[name]
-        if shader_trees.is_driven(socket):
-            return next(link.from_socket for link in socket.links if shader_trees.counts(link))
-        if name not in self._moving and has_own_animation(socket, self._animated):
-            is_color = socket.type == "RGBA"
-            source = self._helper("ShaderNodeRGB" if is_color else "ShaderNodeValue")
-            source.location.x -= 440
-            source.label, source.outputs[0].default_value = name, socket.default_value
-            self._moving[name] = source
-        return self._moving[name].outputs[0] if name in self._moving else None
 
     def _move_animation(self):
         """Moves the animation of the node's sockets to a parameter, if it has just that effect, or
@@ -212,119 +189,6 @@ class Replacement:
             shader = self._mix("Alpha", clear.outputs[0], shader)
         return shader
 
-    def _scattering(self, base):
-        """A base, part of which scatters light beneath the surface."""
-        if not self._plan.subsurface:
-            return base
-        scattering = self._helper("ShaderNodeSubsurfaceScattering")
-        scattering.falloff = self._node.subsurface_method
-        # Where a Principled node has a socket for this, that replaces it.
-        scattering.inputs["IOR"].default_value = self._plan.subsurface
-        self._give(scattering.inputs["Color"], "Base Color")
-        for socket in scattering.inputs:
-            name = f"Subsurface {socket.name}"
-            if name in self._node.inputs and name != SUBSURFACE:
-                self._give(socket, name)
-        if "Roughness" in scattering.inputs:
-            # Of this node it is the width of the facets, of a Principled node the root of it.
-            if self._source("Roughness"):
-                rough = self._roughness()
-                rough = self._operation("ShaderNodeMath", "MULTIPLY", rough, rough)
-                self._tree.links.new(rough, scattering.inputs["Roughness"])
-            else:
-                rough = shader_values.constant(self._node.inputs["Roughness"])
-                scattering.inputs["Roughness"].default_value = min(max(rough, 0.0), 1.0) ** 2
-        self._link_vectors(scattering)
-        return self._mix(SUBSURFACE, base, scattering.outputs[0])
-
-    def _glass(self):
-        """A Principled node with the transmission of the replaced one alone."""
-        glass = self._helper("ShaderNodeBsdfPrincipled")
-        glass.distribution = self._node.distribution
-        glass.inputs[TRANSMISSION].default_value = 1
-        for name in TRANSMISSION_SHARED:
-            self._give(glass.inputs[name], name)
-        self._link_vectors(glass)
-        return glass.outputs[0]
-
-    def _link_vectors(self, helper):
-        """Gives a node the normal and the tangent of the replaced one."""
-        for name in ("Normal", "Tangent"):
-            if name in helper.inputs and (source := self._vector(name)):
-                self._tree.links.new(source, helper.inputs[name])
-
-    def _covered(self, below):
-        """A shader under the Uppers of the node: a Principled node that has no other effect but
-        emission, which Cycles dims by them."""
-        uppers = self._helper("ShaderNodeBsdfPrincipled")
-        # An IOR of 1 reflects nothing.
-        uppers.inputs["Base Color"].default_value = 0, 0, 0, 1
-        uppers.inputs["IOR"].default_value = 1
-        shown = tuple(f"{upper.name} " for upper in self._plan.uppers)
-        shown += ("Emission ",) if self._plan.glows else ()
-        for socket in uppers.inputs:
-            if socket.name in ("Normal", "Coat Normal"):
-                if source := self._source(socket.name):
-                    self._tree.links.new(source, socket)
-            elif socket.name.startswith(shown):
-                self._give(socket, socket.name)
-        left = None
-        for upper in self._plan.uppers:
-            share = self._left_by(upper)
-            left = self._operation("ShaderNodeMath", "MULTIPLY", left, share) if left else share
-        dimmed = self._helper("ShaderNodeMixShader")
-        self._tree.links.new(left, dimmed.inputs[0])
-        self._tree.links.new(below, dimmed.inputs[2])
-        return self._sum(uppers.outputs[0], dimmed.outputs[0])
-
-    def _left_by(self, upper):
-        """Nodes for the share of light that an Upper leaves to what lies below."""
-        rough = self._clamped(upper.roughness) if len(upper.rest[0]) > 1 else None
-        rows = [self._polynomial(row, rough) for row in upper.rest]
-        rest = self._polynomial(rows, self._facing(self._normal_of(upper)))
-        taken = self._operation("ShaderNodeMath", "SUBTRACT", 1.0, rest)
-        weight = self._source(upper.weight)
-        if weight is None:
-            weight = max(shader_values.constant(self._node.inputs[upper.weight]), 0.0)
-        taken = self._operation("ShaderNodeMath", "MULTIPLY", taken, weight)
-        if upper.top != 1:
-            taken = self._operation("ShaderNodeMath", "MULTIPLY", taken, upper.top)
-        share = self._operation("ShaderNodeMath", "SUBTRACT", 1.0, taken)
-        return self._operation("ShaderNodeMath", "MAXIMUM", share, 0.0)
-
-    def _normal_of(self, upper):
-        """The normal of an Upper: an output, or None for the surface's own. Cycles gives sheen that
-        of the coat as far as the coat covers it."""
-        normal, coat = self._source("Normal"), self._source("Coat Normal")
-        if coat is None or upper.name == "Coat":
-            return coat or normal
-        if "Coat" not in [other.name for other in self._plan.uppers]:
-            return normal
-        if self._source("Coat Weight"):
-            weight = self._clamped("Coat Weight")
-        else:
-            weight = shader_values.constant(self._node.inputs["Coat Weight"])
-            weight = min(max(weight, 0.0), 1.0)
-        normal = normal or self._helper("ShaderNodeNewGeometry").outputs["Normal"]
-        turn = self._operation("ShaderNodeVectorMath", "SUBTRACT", coat, normal)
-        turned = self._operation("ShaderNodeVectorMath", "MULTIPLY_ADD", turn, weight, normal)
-        return self._operation("ShaderNodeVectorMath", "NORMALIZE", turned)
-
-    def _helper(self, kind):
-        """A node that is added along with a group to replace the node."""
-        tree, group = self._tree, self._group
-        count = sum(n.get(HELPS) == group.name for n in tree.nodes)
-        helper = tree.nodes.new(kind)
-        helper.location = (group.location.x + 220, group.location.y + 60 - 60 * count)
-        helper.hide, helper[HELPS] = True, group.name
-        return helper
-
-    def _sum(self, first, second):
-        add = self._helper("ShaderNodeAddShader")
-        self._tree.links.new(first, add.inputs[0])
-        self._tree.links.new(second, add.inputs[1])
-        return add.outputs[0]
-
     def _rest(self):
         """Nodes for the light that a layer leaves to its base, the polynomial of layer.rest()."""
         rest = self._plan.rest
@@ -333,45 +197,10 @@ class Replacement:
         rows = [self._polynomial(row, of) for row in rest]
         return self._polynomial(rows, self._facing(self._source("Normal")))
 
-    def _facing(self, normal):
-        """1 minus the cosine of the view. `normal`: an output, or None for the surface's own."""
-        # With this Blend, Facing is 1 minus the cosine.
-        view = self._helper("ShaderNodeLayerWeight")
-        view.inputs["Blend"].default_value = 0.5
-        if normal:
-            # Where the normal faces away from the viewer, Cycles bends it back.
-            if group := group_content.bent_normal_group(self._plan.model):
-                bent = self._helper("ShaderNodeGroup")
-                bent.node_tree = group
-                self._tree.links.new(normal, bent.inputs["Normal"])
-                normal = bent.outputs["Normal"]
-            self._tree.links.new(normal, view.inputs["Normal"])
-        return view.outputs["Facing"]
-
-    def _roughness(self):
-        """The linked roughness between 0 and 1."""
-        return self._clamped("Roughness")
-
     def _share(self):
         """The largest channel of the input of Plan.varying, as a share between 0 and 1."""
         top = self._plan.varying.top
         return self._clamped(self._plan.varying.socket, 1 / top)
-
-    def _clamped(self, name, factor=1.0):
-        if name not in self._clamps:
-            source = self._source(name)
-            if self._node.inputs[name].type == "RGBA":
-                channels = self._helper("ShaderNodeSeparateColor")
-                self._tree.links.new(source, channels.inputs[0])
-                red, green, blue = channels.outputs
-                source = self._operation("ShaderNodeMath", "MAXIMUM", red, green)
-                source = self._operation("ShaderNodeMath", "MAXIMUM", source, blue)
-            if factor != 1:
-                source = self._operation("ShaderNodeMath", "MULTIPLY", source, factor)
-            clamped = self._helper("ShaderNodeClamp")
-            self._tree.links.new(source, clamped.inputs["Value"])
-            self._clamps[name] = clamped.outputs[0]
-        return self._clamps[name]
 
     def _followed(self, law, varying):
         """Nodes for a row of Part.laws."""
@@ -385,26 +214,6 @@ class Replacement:
             found = self._operation("ShaderNodeVectorMath", "MULTIPLY_ADD", found, of, c)
         found = self._operation("ShaderNodeVectorMath", "MAXIMUM", found, 0.0)
         return self._operation("ShaderNodeVectorMath", "MINIMUM", found, 1.0)
-
-    def _polynomial(self, coefficients, of):
-        """Nodes for Horner's rule. Coefficients are numbers or outputs of nodes."""
-        found = coefficients[-1]
-        for c in reversed(coefficients[:-1]):
-            found = self._operation("ShaderNodeMath", "MULTIPLY_ADD", found, of, c)
-        return found
-
-    def _operation(self, kind, operation, *operands):
-        """A Math or Vector Math node. Operands are numbers, vectors or outputs of nodes."""
-        step = self._helper(kind)
-        step.operation = operation
-        for socket, operand in zip(step.inputs, operands, strict=False):
-            if isinstance(operand, bpy.types.NodeSocket):
-                self._tree.links.new(operand, socket)
-            elif isinstance(operand, float) and kind == "ShaderNodeVectorMath":
-                socket.default_value = (operand,) * 3
-            else:
-                socket.default_value = operand
-        return step.outputs[0]
 
     def _again(self, law):
         """Nodes for native_bsdf.interreflection() of a linked colour or roughness."""
@@ -453,23 +262,6 @@ class Replacement:
         self._tree.links.new(tint, present["tint"])
         return brightest
 
-    def _mix(self, name, first, second):
-        mix = self._helper("ShaderNodeMixShader")
-        self._give(mix.inputs[0], name)
-        self._tree.links.new(first, mix.inputs[1])
-        self._tree.links.new(second, mix.inputs[2])
-        return mix.outputs[0]
-
-    def _give(self, socket, name):
-        """Passes what reaches a socket of the replaced node on to another socket."""
-        if source := self._source(name):
-            self._tree.links.new(source, socket)
-            return
-        value = shader_values.constant(self._node.inputs[name])
-        socket.default_value = (*value, 1.0) if socket.type == "RGBA" else value
-        if name in self._direct:
-            self._given[name] = socket
-
     def _follow(self, rough, factor, power, low, high, stretched):
         """Nodes for a row of Part.widths. `rough`: the socket that they follow."""
         found = None
@@ -484,19 +276,10 @@ class Replacement:
         found = self._math("MAXIMUM", self._math("MULTIPLY", found, factor), low)
         return self._math("MINIMUM", found, high)
 
-    def _math(self, operation, *operands):
-        """A Math node before the group."""
-        output = self._operation("ShaderNodeMath", operation, *operands)
-        output.node.location.x -= 440
-        return output
-
     @property
     def _sockets(self):
         """The names of the node's sockets of anisotropy and rotation."""
         return ANISOTROPY[KINDS[self._node.bl_idname]]
-
-    def _vector(self, name):
-        return self._source(name) if name in self._node.inputs else None
 
     def _tangent(self):
         """The tangent of the replaced node. Nodes without a link take that of a Tangent node."""

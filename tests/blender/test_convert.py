@@ -836,6 +836,24 @@ def test_a_metallic_node_becomes_what_a_metal_does(extension, convert, distribut
     assert only(convert.plan([metallic])).refusal == "its metal is given by IOR and Extinction"
 
 
+@pytest.mark.parametrize("method", ["BURLEY", "RANDOM_WALK", "RANDOM_WALK_SKIN"])
+def test_every_method_of_subsurface_scattering_stays(extension, convert, method):
+    """With sockets that the others lack."""
+    material, node = material_of("principled", Subsurface_Weight=0.7, IOR=1.8)
+    node.subsurface_method = method
+    own = "Subsurface IOR" in node.inputs
+    if own:
+        node.inputs["Subsurface IOR"].default_value = 1.3
+    assert extension.api.convert_materials(extension.api.plan_conversion([material])) == 1
+    nodes = material.node_tree.nodes
+    (made,) = (n for n in nodes if n.bl_idname == "ShaderNodeSubsurfaceScattering")
+    assert made.falloff == method and own == (method == "RANDOM_WALK_SKIN")
+    if "IOR" in made.inputs:
+        assert made.inputs["IOR"].default_value == pytest.approx(1.3 if own else 1.8)
+    else:
+        assert method == "BURLEY"
+
+
 def test_metal_neither_scatters_nor_transmits(extension, convert):
     inputs = {"Metallic": 1.0, "Subsurface_Weight": 0.7, "Transmission_Weight": 0.4}
     material, _ = material_of("principled", "GGX", **inputs)
