@@ -7,7 +7,7 @@ import functools
 import bpy
 import numpy as np
 
-from ..common.i18n import Sentence, in_percent, say
+from ..common.i18n import Sentence, say
 from ..nearest import native_bsdf, specular
 from ..nearest.native_bsdf import Native
 from ..trees import animation, shader_trees, shader_values, value_bounds
@@ -20,9 +20,6 @@ _ANISOTROPIES = (0.5, 0.8, 0.2)
 DARK, BRIGHT = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 #: Models are not compared with linked roughnesses below this: Cycles shows a mirror there.
 _LEAST_ROUGHNESS = 0.05
-#: The highest reflectance of an interface that converts: an IOR of 5. With 8 blocks of pixels were
-#: up to 8 % off where an error of 0.5 % was stated, with 1,000 up to 79 %.
-_MOST_F0 = 0.445
 #: If the instances of a node have more colours, the error is computed for the darkest and the
 #: brightest.
 _MOST_COLORS = 4
@@ -355,16 +352,7 @@ def f0_of(inputs):
     if ior < 1:
         # As seen from within glass: beyond some angle everything is reflected.
         raise Refused(say("its {socket} is below 1", socket=Sentence("IOR")))
-    f0 = ((ior - 1) / (ior + 1)) ** 2 * 2 * max(level, 0.0)
-    if f0 > _MOST_F0:
-        raise Refused(
-            say(
-                "it reflects {percent} % at normal incidence, and converts with up to {limit} %",
-                percent=in_percent(min(f0, 1.0)),
-                limit=in_percent(_MOST_F0),
-            )
-        )
-    return f0
+    return min(((ior - 1) / (ior + 1)) ** 2 * 2 * max(level, 0.0), 1.0)
 
 
 def is_mirror(roughnesses):

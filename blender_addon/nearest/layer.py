@@ -113,7 +113,7 @@ def schlick_like(f0, tint=1.0):
     dielectric with a tint: its relative error is the smallest, on average over cosines from 0.2."""
     c = np.linspace(0.2, 1, 33)
     wanted = native_bsdf.tinted_dielectric(native_bsdf.dielectric(f0, c), f0, (tint,))[:, 0]
-    f0s = (f0 * tint * np.linspace(0.7, 1.3, 61))[:, None, None]
+    f0s = np.minimum(f0 * tint * np.linspace(0.7, 1.3, 61), 1)[:, None, None]
     tints = np.linspace(0, 1, 101)[:, None]
     tinted = native_bsdf.TINTED
     strongest = c * (1 - c) ** 6 / (tinted * (1 - tinted) ** 6)

@@ -20,6 +20,8 @@ _SHARE = _SHARE * _MU
 
 #: Cosine of 82 degrees, where an edge tint counts most.
 TINTED = 1 / 7
+#: The reflectance at normal incidence of an interface with an IOR of 1,000.
+_MOST_F0 = 0.996
 #: A node with a smaller roughness is an ideal mirror.
 SMOOTH = 1e-3
 
@@ -71,7 +73,9 @@ class Native:
 
 def dielectric(f0, cosine):
     """Fresnel reflectance of a dielectric with reflectance f0 at normal incidence."""
-    eta = (1 + f0**0.5) / (1 - f0**0.5)
+    # The largest IOR that Blender's nodes take is 1,000.
+    root = min(f0, _MOST_F0) ** 0.5
+    eta = (1 + root) / (1 - root)
     c = np.clip(cosine, 0, 1)
     g = np.sqrt(np.maximum(eta**2 - 1 + c**2, 0))
     # Without refraction (IOR 1) at grazing angles both terms are 0.
@@ -88,8 +92,10 @@ def mean_dielectric(f0):
 def tinted_dielectric(reflectance, f0, tint):
     """A reflectance of dielectric() or mean_dielectric() where that at normal incidence has a tint:
     (..., n) for n tints."""
-    tinted = f0 * np.asarray(tint, np.float64)
-    return tinted + (1 - tinted) * (np.asarray(reflectance)[..., None] - f0) / (1 - f0)
+    tinted, real = f0 * np.asarray(tint, np.float64), min(f0, _MOST_F0)
+    # With an IOR above 3.7 the reflectance first falls from normal incidence on; Cycles' does not.
+    share = np.maximum((np.asarray(reflectance)[..., None] - real) / (1 - real), 0)
+    return tinted + (1 - tinted) * share
 
 
 def gloss_fresnel(native, cosine):

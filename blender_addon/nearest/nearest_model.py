@@ -195,6 +195,8 @@ _TINTED_MIRROR = Candidate(
     lambda n: {"f0": n.color, "tint": _edge_tint(n), "ax": NARROWEST, "ay": NARROWEST},
     links={"f0": "Color"},
 )
+#: Reflectance at normal incidence.
+_MOST_SCHLICK = 0.15
 _COATED = Candidate("coupled", lambda n: {"r0": n.f0, "rm": n.color}, None, {"rm": "Color"})
 
 
@@ -259,7 +261,9 @@ def _candidates(native, has, natives, layered):
         return (*_MIRRORS, _METAL_MIRROR)
     if native.is_mirror and native.metallic == 0:
         tinted = native.tint != (1, 1, 1)
-        return (_COATED, *(_polished({"rd": "Color"}, sharp=True) if tinted else ()))
+        # Above this the Fresnel term is far from Schlick's, which the ideal mirrors have.
+        layers = _layered(natives, has) if tinted or native.f0 > _MOST_SCHLICK else ()
+        return (_COATED, *(_polished({"rd": "Color"}, sharp=True) if tinted else ()), *layers)
     if native.is_mirror:
         if native.tint != (1, 1, 1):
             return (_METAL_MIRROR, _TINTED_MIRROR)
