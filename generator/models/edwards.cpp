@@ -59,13 +59,15 @@ template <class T> struct Edwards {
   T lobe(const Vec3<T>& wi, const Vec3<T>& wo) const {
     const HalfVector<T> k(wi, wo);
     const T side = named("side", wo.x * k.h.y - wo.y * k.h.x);
-    const T K = named("K", maximum(sqr(k.oh) + sqr(side), tiny<T>()));
+    // f grows as (n.o)^-4; without a limit it overflows in single precision within 3e-8 of the horizon.
+    const T K = named("K", maximum(sqr(k.oh) + sqr(side), T(1e-15)));
     // |m|^2 and 1 - |m|^2. Each is the exact one where it is small.
     const T m2 = named("m2", sin2_theta(k.h) / K), rest = named("rest", wi.z * wo.z / K);
     const T near_mirror = log1p(-minimum(m2, T(0.5))), near_horizon = log(maximum(rest, tiny<T>()));
     const T lump = named("lump", exp((e - T(1)) * select(m2 < T(0.5), near_mirror, near_horizon)));
     const T r = named("r", wo.z / K);
-    return select(above(wi, wo), (e + T(1)) / (T(4) * pi<T>()) * lump * sqr(r) * (wo.z * k.h.z / (K * k.oh)), T(0));
+    return select(above(wi, wo),
+                  (e + T(1)) / (T(4) * pi<T>()) * lump * sqr(r) * (wo.z * k.h.z / (K * maximum(k.oh, T(3e-8)))), T(0));
   }
 
   Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const { return rho * lobe(wi, wo); }
