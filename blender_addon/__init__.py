@@ -8,7 +8,7 @@ import bpy
 
 from . import lamps, operators
 from .common import enabling, i18n
-from .groups import automatic, imports, update
+from .groups import automatic, choice_sockets, imports, update
 from .panels import plot_panel, ui
 from .warnings import closure_slots, console
 
@@ -32,6 +32,7 @@ def register():
     ui.register()
     plot_panel.register()
     lamps.register()
+    choice_sockets.register()  # before what makes groups anew
     automatic.register()  # after lamps: its handlers read how many there are
     imports.register()
     update.register()
@@ -46,6 +47,7 @@ def unregister():
     imports.unregister()
     lamps.unregister()
     automatic.unregister()
+    choice_sockets.unregister()
     plot_panel.unregister()
     ui.unregister()
     operators.unregister()

@@ -265,6 +265,7 @@ def _add_model(tree, model, form, values):
 
 
 def _new_stack(lobes, representation, name, put_together):
+    argument_checks.text(name)
     (first, values), *others = measured.as_pairs(lobes)
     checked = [(model, *_checked(model, representation, given)) for model, given in others]
     material = new_material(first, representation, **values)
@@ -456,7 +457,7 @@ def plan_conversion(materials, limit=convert.LIMIT):
     the fraction of the light that the replacement misplaces; or, where no model comes within
     `limit`, the reason for the refusal. If no model comes near at all, the error is infinite.
     Changes nothing."""
-    limit = argument_checks.number(limit)
+    limit = argument_checks.fraction(limit)
     return [
         p.within(limit)
         for p in convert.plan(

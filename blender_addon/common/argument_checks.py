@@ -26,8 +26,19 @@ def node(given):
     return _of(bpy.types.Node, given, say("Expected a node, got {given!r}", given=given))
 
 
+def text(given):
+    return _of(str, given, say("Expected a text, got {given!r}", given=given))
+
+
 def number(given):
     return _of(Real, given, say("Expected a number, got {given!r}", given=given))
+
+
+def fraction(given):
+    """A number that is not negative; NaN is none."""
+    if not number(given) >= 0:
+        raise ValueError(say("Expected a number from 0, got {given!r}", given=given))
+    return given
 
 
 def plan(kind, given):

@@ -44,14 +44,18 @@ def has_menus():
     return bpy.app.version >= (5, 0, 0)
 
 
+def choice_socket_type():
+    return "NodeSocketMenu" if has_menus() else "NodeSocketInt"
+
+
 def _choice_socket(group, parameter):
-    default = parameter["choices"].index(parameter["default"])
+    default, kind = parameter["choices"].index(parameter["default"]), choice_socket_type()
     if has_menus():
-        return _socket(group, parameter["label"], "NodeSocketMenu", tooltip(parameter))
+        return _socket(group, parameter["label"], kind, tooltip(parameter))
     return _socket(
         group,
         parameter["label"],
-        "NodeSocketInt",
+        kind,
         tooltip(parameter),
         min_value=0,
         max_value=len(parameter["choices"]) - 1,

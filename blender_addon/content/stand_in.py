@@ -251,14 +251,14 @@ def add(group, script, outputs, instead):
 def add_in_eevee(group, outputs, instead):
     """Returns outputs by name: in Cycles the given ones, in EEVEE those of the stand-in. The switch
     is a Shader to RGB node: Cycles ignores it, and the linked socket keeps its own value."""
-    lit = group.nodes.new("ShaderNodeEmission")
-    lit.inputs["Color"].default_value = (1, 1, 1, 1)
-    lit.inputs["Strength"].default_value = 1.0
+    # What has no closures covers what is behind it. An Emission node would do as well, but
+    # exporters find it: in a file of glTF the material would shine.
+    nothing = group.nodes.new("ShaderNodeAddShader")
     seen = group.nodes.new("ShaderNodeShaderToRGB")
     seen.name = seen.label = EEVEE
-    lit.location, seen.location = (-150, 300), (0, 300)
-    group.links.new(lit.outputs[0], seen.inputs[0])
-    mixed = choose(group, seen.outputs["Color"], outputs, instead)
+    nothing.location, seen.location = (-150, 300), (0, 300)
+    group.links.new(nothing.outputs[0], seen.inputs[0])
+    mixed = choose(group, seen.outputs["Alpha"], outputs, instead)
     # Formulas that use random directions have no albedo output: the twin's is used.
     return {**instead, **outputs, **mixed}
 

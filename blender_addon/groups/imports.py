@@ -11,7 +11,7 @@ from bpy.app.handlers import persistent
 from .. import lamps
 from ..common import app_handlers
 from ..content import part_groups
-from . import automatic, model_nodes, nodes
+from . import automatic, choice_sockets, model_nodes, nodes
 
 
 def _dependencies(context, kind):
@@ -63,6 +63,7 @@ def _after_import(context):
     imported = [group for group in bpy.data.node_groups if group.session_uid in known]
     groups = [group for group in imported if model_nodes.TAG in group]
     known = {group.session_uid for group in groups}
+    choice_sockets.carry()
     if groups or any(lamps.is_group(group) for group in imported):
         lamps.follow()
         automatic.follow()

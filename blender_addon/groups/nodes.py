@@ -15,6 +15,7 @@ from ..common import editable, enabling
 from ..common.i18n import say
 from ..content import group_content, part_groups, stand_in
 from ..content.group_content import ALBEDO, script_problem
+from ..content.group_sockets import choice_socket_type
 from ..packs import device, pack
 from ..trees import animation
 from . import model_nodes
@@ -60,8 +61,18 @@ def find_group(form, albedo=False, with_osl=None, room=lamps.WHOLE):
 
 
 def is_sound(group):
-    """Whether nothing that a group was made with is missing."""
-    return bool(group.nodes) and script_problem(group) is None
+    """Whether nothing that a group was made with is missing, and this Blender would make it."""
+    return bool(group.nodes) and script_problem(group) is None and has_own_choices(group)
+
+
+def has_own_choices(group):
+    """Whether the sockets of a group's choices are those that this Blender makes."""
+    tag = group[TAG]
+    made = tag.get("sockets", {})
+    found = {made[name] for name in json.loads(tag["choices"]) if name in made}
+    kind = choice_socket_type()
+    items = (item for item in group.interface.items_tree if item.item_type == "SOCKET")
+    return all(item.socket_type == kind for item in items if item.identifier in found)
 
 
 def with_parts(groups):
@@ -96,6 +107,7 @@ def _replace_by_local_equal(group):
     wanted = description(group)
     for other in bpy.data.node_groups:
         same = other != group and other.library is None and TAG in other
+        same = same and has_own_choices(other) == has_own_choices(group)
         if same and description(other) == wanted and script_problem(other) is None:
             group.user_remap(other)
             remove_group(group)
@@ -267,7 +279,8 @@ def adapt_to_scene(group, lacks_osl, room_needed=lamps.room_needed):
             return False
         if room_needed().joined(_room_of(tag)) == _room_of(tag):
             return False
-    if not model_nodes.is_current(group):
+    # A socket of another Blender would lose its choice.
+    if not model_nodes.is_current(group) or not has_own_choices(group):
         return False
     model = pack.model(tag["model"])
     wanted = model.forms[tag[AUTO]] if keeps_form or not lacks_osl else model.native_form
@@ -394,6 +407,23 @@ def switch(node, representation):
         model_name, representation, albedo=model_nodes.uses_albedo(node), values=values
     )
     _exchange(node, group)
+
+
+def remake(node, known):
+    """Gives a node a group that this Blender makes anew, of the same form. `known`: values of
+    choices that its sockets do not tell. Raises ValueError and CompileError; the node is then as
+    it was."""
+    model_name, form = model_nodes.identity(node)
+    values = model_nodes.constants(node) | known
+    group = ensure_group(
+        model_name,
+        "auto" if model_nodes.is_automatic(node) else form,
+        albedo=model_nodes.uses_albedo(node),
+        values=values,
+    )
+    _exchange(node, group)
+    for name, value in known.items():
+        model_nodes.set_value(node, name, value)
 
 
 def _exchange(node, group):

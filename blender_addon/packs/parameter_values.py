@@ -54,7 +54,10 @@ def checked_number(what, value, low, high):
     high."""
     if not is_number(value):
         raise ValueError(f"{what}: expected a number from {low:g} to {high:g}, got {value!r}")
-    value = float(value)
+    try:
+        value = float(value)
+    except OverflowError:  # an integer of more than 308 digits
+        value = math.inf if value > 0 else -math.inf
     if not math.isfinite(value) or not low <= value <= high:
         raise ValueError(f"{what}: expected a number from {low:g} to {high:g}, got {value:g}")
     return value

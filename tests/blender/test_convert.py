@@ -948,6 +948,10 @@ def test_a_limit_is_a_reason(extension, convert):
     assert extension.api.convert_materials([plan]) == 0 and node.outputs[0].is_linked
     with pytest.raises(ValueError, match="Expected a number, got 'much'"):
         extension.api.plan_conversion([material], limit="much")
+    with pytest.raises(ValueError, match="Expected a number from 0, got nan"):
+        extension.api.plan_conversion([material], limit=float("nan"))
+    with pytest.raises(ValueError, match="Expected a number from 0, got -1"):
+        extension.api.plan_conversion([material], limit=-1)
     # A colour far above 1, which no model can reflect.
     (plan,) = extension.api.plan_conversion([material_of("diffuse", Color=(9.0, 0.0, 0.0))[0]])
     assert "sends 89 % of the light" in plan.refusal

@@ -417,3 +417,27 @@ def test_tables_over_a_slider_are_what_the_tool_judges(extension, tool, empty):
         print(f"{name}: off by {off:.2g} of {largest:.2g}")
         assert largest > 0.1, name
         assert off <= 2e-3 * largest, name
+
+
+def test_an_exported_material_does_not_shine(extension, empty, tmp_path):
+    """Exporters take an Emission node inside a group for light."""
+    import json
+
+    empty.cycles.shading_system = False
+    bpy.ops.preferences.addon_enable(module="io_scene_gltf2")
+    for model in ("lambert", "microfacet", "coupled"):
+        add_sphere(empty, extension.api.new_material(model))
+    path = tmp_path / "balls.gltf"
+    bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLTF_SEPARATE")
+    materials = json.loads(path.read_text())["materials"]
+    assert len(materials) == 3
+    assert not any("emissiveFactor" in material for material in materials)
+
+
+def test_arguments_that_python_lacks_a_number_for(extension, empty):
+    api, before = extension.api, set(bpy.data.materials)
+    with pytest.raises(ValueError, match="expected a number from 0 to 1e"):
+        api.new_material("max_phong", e=10**400)
+    with pytest.raises(ValueError, match="Expected a text, got None"):
+        api.new_sum([("lambert", {})], name=None)
+    assert set(bpy.data.materials) == before
