@@ -72,6 +72,7 @@ CASES = [
     pytest.param("charlie", {"r": 0.2, "terminator": "soft"}, marks=SLOW),
     pytest.param("cook_torrance", {}, marks=SLOW),
     pytest.param("coupled", {}, marks=SLOW),
+    pytest.param("edwards", {}, marks=SLOW),
     pytest.param("kelemen", {"f0": (0.2, 0.1, 0.05)}, marks=SLOW),
     pytest.param("lafortune", {}, marks=SLOW),
     pytest.param("disney_diffuse", {"rho": (0.9, 0.5, 0.2), "r": 0.8}, marks=SLOW),

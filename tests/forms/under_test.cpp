@@ -27,9 +27,9 @@ std::vector<ParamValues> cases_of(const ModelInfo& info) {
 
 /// Facets with another masking, or closures of another shape: their light beyond the model's is judged as a whole.
 bool exceeds_a_little(const std::string& name) {
-  static const std::set<std::string> names = {
-      "blinn",   "cook_torrance", "disney",         "disney_diffuse", "glossy_reflector",
-      "kelemen", "microfacet",    "phong_material", "shaped_facets",  "ward"};
+  static const std::set<std::string> names = {"blinn",          "cook_torrance",    "disney",  "disney_diffuse",
+                                              "edwards",        "glossy_reflector", "kelemen", "microfacet",
+                                              "phong_material", "shaped_facets",    "ward"};
   return names.count(name) == 1;
 }
 
@@ -101,6 +101,9 @@ const UnderRow kUnderRows[] = {{"ashikhmin_shirley", {"rs=0,0,0"}, 0.9},
                                {"disney", {"subsurface=1"}, 0.66},
                                {"disney_diffuse", {}, 0.7},
                                {"disney_diffuse", {"r=0"}, 0.58},
+                               {"edwards", {}, 0.5},
+                               {"edwards", {"e=1"}, 0.15},
+                               {"edwards", {"e=1000"}, 0.9},
                                {"eon", {}, 0.97},
                                {"eon", {"rho=1"}, 0.999999},
                                {"glossy_reflector", {}, 0.98},

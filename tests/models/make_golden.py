@@ -853,6 +853,32 @@ def kelemen_albedo(p, cos_o):
     return [half_albedo(one, lambda p: p["m"])(p, cos_o) + matte] * 3
 
 
+# ---- Edwards et al. 2006, the disk of sec. 4, with the lump of BRDF Explorer's edwards06.brdf -----
+
+
+def edwards_point(wi, wo):
+    """A point of the unit disk as a complex number: the slopes of the half vector, scaled and moved
+    for the view."""
+    ki, ko = vec(wi), vec(wo)
+    x, y = (ko[2] * (a + b) / (ki[2] + ko[2]) - b for a, b in zip(ki[:2], ko[:2], strict=True))
+    return mp.mpc(x, y)
+
+
+def edwards_pdf(p, wi, wo):
+    """The lump, carried to the disk by the automorphism that moves the point of the mirror direction
+    to the centre."""
+    _, ko, h, oh = half(wi, wo)
+    e, u, at = mp.mpf(p["e"]), edwards_point(wi, wo), -mp.mpc(ko[0], ko[1])
+    below = 1 - mp.conj(at) * u
+    moved, stretched = (u - at) / below, (1 - abs(at) ** 2) / below**2
+    density = (e + 1) / mp.pi * (1 - abs(moved) ** 2) ** e * abs(stretched) ** 2
+    return density * ko[2] ** 2 / (4 * h[2] ** 3 * oh)
+
+
+def edwards_f(p, wi, wo):
+    return [c * edwards_pdf(p, wi, wo) / vec(wi)[2] for c in p["rho"]]
+
+
 # ---- Microfacets: Walter et al. 2007, Heitz 2014 -----------------------------------------------
 
 
@@ -2139,6 +2165,21 @@ MODELS = {
             {"m": 0.05, "f0": (0.5, 0.5, 0.5), "rm": (1, 1, 1)},
         ],
         cosines=[1, 0.5, 0.1],
+    ),
+    "edwards": dict(
+        f=edwards_f,
+        pdf=edwards_pdf,
+        albedo=lambda p, cos_o: p["rho"],
+        defaults={"rho": (0.5, 0.5, 0.5), "e": 20},
+        cases=[
+            {},
+            {"e": 1, "rho": (1, 1, 1)},
+            {"e": 3.5, "rho": (0.1, 0.5, 1)},
+            {"e": 3000},
+            {"e": 1e7},
+        ],
+        albedo_cases=[{"e": 1, "rho": (1, 1, 1)}, {}, {"e": 3000, "rho": (0.1, 0.5, 1)}],
+        cosines=[1, 0.5, 0.05],
     ),
     "microfacet": dict(
         f=micro_f,
