@@ -221,6 +221,7 @@ def test_plastic_is_near_without_osl(convert, empty, roughness, ior):
         assert plan.error < worst
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("osl", [False, True])
 @pytest.mark.parametrize("roughness", [0.3, "linked"])
 @pytest.mark.parametrize("normal", [(0.3, -0.8, 0.5), (0.9, 0.1, 0.4)], ids=["bent", "away"])
@@ -300,6 +301,7 @@ def test_a_metal_is_the_microfacet_model(convert, roughness):
         assert plan.values["f0"] == pytest.approx(GOLD)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("distribution", ["GGX", "MULTI_GGX"])
 @pytest.mark.parametrize("color", [(0.05, 0.05, 0.05), (0.05, 0.03, 0.01), GOLD])
 def test_a_dark_glossy_node_is_near(extension, convert, empty, color, distribution):
@@ -327,6 +329,7 @@ def test_a_dark_glossy_node_is_near(extension, convert, empty, color, distributi
     assert max(errors) < 0.025
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("distribution", ["GGX", "MULTI_GGX"])
 @pytest.mark.parametrize(
     ("inputs", "worst"),
@@ -406,6 +409,7 @@ def test_white_facets_lose_no_light(extension, convert, alpha):
         assert albedo == pytest.approx(1, abs=1e-3)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("osl", [False, True])
 @pytest.mark.parametrize("roughness", [0.8, "linked"])
 def test_a_picture_of_a_rough_metal_is_as_before(extension, convert, empty, roughness, osl):
@@ -439,6 +443,7 @@ FOLLOWED = {
 }
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("osl", [False, True])
 @pytest.mark.parametrize("distribution", ["GGX", "MULTI_GGX"])
 @pytest.mark.parametrize("socket", FOLLOWED)
@@ -481,6 +486,7 @@ def ball_before_a_sky(scene, material, size, samples, osl):
     scene.cycles.shading_system, scene.cycles.max_bounces = osl, 12
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("osl", [False, True])
 @pytest.mark.parametrize(
     ("color", "more"),
@@ -548,6 +554,7 @@ def tinted_glass(kind, color):
     return material, node
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("osl", [False, True])
 @pytest.mark.parametrize("color", [(0.8, 0.8, 0.8), (0.9, 0.3, 0.05), None])
 @pytest.mark.parametrize("kind", ["glass", "principled"])
@@ -1267,6 +1274,7 @@ def test_nodes_that_are_not_used_are_not_converted(extension, convert):
     assert convert.apply([plan]) == 0 and node.outputs[0].is_linked
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("mapped", [None, "Base Color", "Metallic", "Roughness", "Normal"])
 def test_an_object_that_glows_stays_a_lamp(extension, convert, empty, mapped):
     """Whatever varies in the rest of its material."""
@@ -1402,6 +1410,7 @@ def has_a_colour_by_an_image(material, node):
     tree.links.new(picture.outputs["Color"], node.inputs["Base Color"])
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     "change",
     [
@@ -1561,6 +1570,7 @@ def test_the_error_of_nodes_is_a_range_over_their_values(convert, name):
         assert plan.least_error * 0.9 - 0.003 < error < plan.error * 1.1 + 0.003
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("color", [0.0, 0.04, 0.5, 1.0])
 def test_a_picture_of_a_linked_colour_is_off_as_is_said(extension, convert, empty, color):
     """Under a lamp as wide as windows, for which the error is stated."""

@@ -351,6 +351,7 @@ def test_one_group_a_form(extension, empty):
     assert extension.api.get_parameters(second)["r0"] == pytest.approx(0.2)
 
 
+@pytest.mark.long
 def test_values_round_trip(extension, empty, subtests):
     for model, entry in extension.api.models().items():
         values = {}

@@ -108,6 +108,7 @@ def test_a_model_of_which_nothing_is_made_is_there_with_its_defaults(
         library.entries()
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_what_needs_open_shading_language_says_so(extension, library, empty, third_of):
     empty.cycles.shading_system = False
@@ -274,6 +275,7 @@ def assert_aims_at(extension, material, lamp):
     assert [s.default_value for s in first.inputs] == pytest.approx(list(lamp.location))
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     ("by_hand", "osl", "faint"),
     [(True, True, 0), (False, True, 0), (True, False, 0), (False, False, 0), (False, False, 3)],

@@ -118,6 +118,7 @@ def test_it_installs_and_comes_up_to_date(visit, repositories):
     assert "outdated" in second["codes"]
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_download_that_fails_leaves_the_version_before(visit, repositories):
     first, torn, altered, whole = visit("older", "newer:torn", "newer:altered", "newer")

@@ -532,6 +532,7 @@ def test_check_scales_with_the_effort_asked_for():
     assert few["values"] < many["values"] / 4
 
 
+@pytest.mark.long
 def test_errors_of_stored_fits_are_the_table_of_their_page():
     script = ROOT / "evidence" / "forms_table.py"
     command = [sys.executable, script, "--tool", TOOL, "fits-over"]
