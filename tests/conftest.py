@@ -51,8 +51,8 @@ def pytest_addoption(parser):
     parser.addoption(
         "--third",
         metavar="TEXT",
-        help="of the tests marked `long`, and of the cases of each marked `many`, run a third, "
-        "which TEXT chooses, a commit for example",
+        help="of the tests marked `long`, the cases of each marked `many`, and the groups marked "
+        "`together`, run a third, which TEXT chooses, a commit for example",
     )
     parser.addoption(
         "--third-of-files",
@@ -86,6 +86,13 @@ def pytest_collection_modifyitems(config, items):
             chosen = third(chosen, text)
         kept |= set(chosen)
     if text is not None:
+        # A few groups, of which each is chosen apart from others.
+        kept -= {
+            item
+            for item in kept
+            for mark in item.iter_markers("together")
+            if zlib.crc32(f"{text} {mark.args[0]}".encode()) % 3
+        }
         long = [item for item in items if item in kept and item.get_closest_marker("long")]
         kept -= set(long) - set(third(long, text))
     if (text := config.getoption("third_of_files")) is not None:

@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 
 pytestmark = pytest.mark.usefixtures("by_the_tool")
+#: Fitting every model to a file takes most of the time of these tests.
+FITS = pytest.mark.together("measured fits")
 
 
 def direction(theta, phi):
@@ -61,6 +63,7 @@ def found(extension, paint):
     return extension.api.measured_fits(paint)
 
 
+@FITS
 def test_what_a_file_holds(paint, found):
     assert found.isotropic and found.path == paint
     # Of models whose errors hardly differ, the simpler one comes first. No data hold a mirror.
@@ -74,6 +77,7 @@ def test_what_a_file_holds(paint, found):
         found.fit("minnaert")
 
 
+@FITS
 @pytest.mark.parametrize("model", ["ward", "factors"])
 def test_a_material_of_a_file(extension, empty, found, model):
     material = extension.api.new_measured_material(found, model)
@@ -107,6 +111,7 @@ def test_matte_light_is_added(extension, empty, write_table):
     assert seen[0] - seen[1] == pytest.approx(0.4, rel=0.05)
 
 
+@FITS
 def test_the_sum_of_lobes_is_added_up(extension, empty, found):
     """A node a lobe, whose sum leads to the output; nothing is left after an error."""
     best = found.lobe_sum()
@@ -315,6 +320,7 @@ def test_curves_look_as_the_data_do(ball, in_blender, two_colored, osl):
     np.testing.assert_allclose(got.mean((0, 1)), data.mean((0, 1)), rtol=0.02)
 
 
+@FITS
 @pytest.mark.slow
 def test_the_operator_makes_the_closest(extension, empty, paint, found, monkeypatch):
     # Fitting all models once more takes ten seconds.
