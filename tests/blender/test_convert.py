@@ -1198,6 +1198,7 @@ def test_a_link_that_blender_ignores_is_no_link(extension, convert, empty, ignor
     assert extension.model_nodes.constants(base)["rho"] is not None
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("kind", ["VolumeAbsorption", "VolumeScatter", "VolumePrincipled"])
 def test_a_volume_in_a_surface_shows_nothing_and_is_no_reason(extension, convert, empty, kind):
     """glTF's importer adds one to the surface of glass."""
