@@ -37,7 +37,7 @@ def third_of(request):
     text = request.config.getoption("third")
     if EVERY_CASE or text is None:
         return list
-    # Apart from the choice among long tests: each part of such a test has its turn.
+    # Apart from the choice among tests: each part of such a test has its turn.
     return lambda cases: third(list(cases), f"{text} cases")
 
 
@@ -51,7 +51,8 @@ def pytest_addoption(parser):
     parser.addoption(
         "--third",
         metavar="TEXT",
-        help="of the tests marked `long` run a third, which TEXT chooses, a commit for example",
+        help="of the tests marked `long`, the cases of each marked `many`, and the groups marked "
+        "`together`, run a third, which TEXT chooses, a commit for example",
     )
     parser.addoption(
         "--third-of-files",
@@ -61,8 +62,9 @@ def pytest_addoption(parser):
 
 
 def third(things, text):
-    """Every third thing, beginning with one of the first three, which the text chooses."""
-    return things[zlib.crc32(text.encode()) % 3 :: 3]
+    """Every third thing, beginning with one of the first three, which the text chooses. If there
+    are fewer, one."""
+    return things[zlib.crc32(text.encode()) % max(min(3, len(things)), 1) :: 3]
 
 
 # After -m has deselected by marks, so that this many remain.
@@ -74,13 +76,23 @@ def pytest_collection_modifyitems(config, items):
     tests = {}
     for item in items:
         tests.setdefault(item.nodeid.split("[")[0], []).append(item)
-    kept = set()
+    kept, text = set(), config.getoption("third")
     for cases in tests.values():
         limits = [len(cases), *([few] if few is not None else [])]
         if not EVERY_CASE:
             limits += [mark.args[0] for mark in cases[0].iter_markers("sample")]
-        kept |= set(evenly(cases, min(limits)))
-    if (text := config.getoption("third")) is not None:
+        chosen = evenly(cases, min(limits))
+        if text is not None and cases[0].get_closest_marker("many"):
+            chosen = third(chosen, text)
+        kept |= set(chosen)
+    if text is not None:
+        # A few groups, of which each is chosen apart from others.
+        kept -= {
+            item
+            for item in kept
+            for mark in item.iter_markers("together")
+            if zlib.crc32(f"{text} {mark.args[0]}".encode()) % 3
+        }
         long = [item for item in items if item in kept and item.get_closest_marker("long")]
         kept -= set(long) - set(third(long, text))
     if (text := config.getoption("third_of_files")) is not None:

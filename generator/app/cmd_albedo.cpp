@@ -23,6 +23,7 @@ void add_albedo_command(Command app) {
     std::vector<std::string> values;
     int count = 0;
     double phi = 0;
+    double error = measure::AlbedoOptions().absolute;
     bool store = false;
   };
   auto o = std::make_shared<Options>();
@@ -38,12 +39,14 @@ void add_albedo_command(Command app) {
   cmd.add_option("values", o->values, "Parameters as name=value; a colour is r,g,b or one number");
   add_number(cmd, "--count", o->count, {2, 1 << 20}, "Number of cosines, from 0.01 to 1; stdin is not read");
   add_number(cmd, "--phi", o->phi, {-7, 7}, "Azimuth of the view direction in radians");
+  add_number(cmd, "--error", o->error, {1e-12, 0.1}, "Error to aim at in each channel");
   cmd.add_flag("--store", o->store,
                "Instead makes the table over all parameters that packs use, and replaces the stored one in\n"
                "data/albedos")
       .excludes("values")
       .excludes("--count")
-      .excludes("--phi");
+      .excludes("--phi")
+      .excludes("--error");
   cmd.callback([o] {
     const Model& model = find_model(o->model);
     if (o->store) {
@@ -59,7 +62,7 @@ void add_albedo_command(Command app) {
     const measure::BoundModel bound = measure::bind_model(model, parse_values(model.info(), o->values));
     CsvWriter out("cos_theta_o,albedo_r,albedo_g,albedo_b,mirror_r,mirror_g,mirror_b,error_estimate");
     const auto write = [&](double cos_theta_o) {
-      const measure::Albedo a = measure::albedo(*bound.brdf, cos_theta_o, o->phi, bound.label);
+      const measure::Albedo a = measure::albedo(*bound.brdf, cos_theta_o, o->phi, bound.label, {.absolute = o->error});
       const Rgb<double> t = a.total();
       out.row({cos_theta_o, t.r, t.g, t.b, a.mirror.r, a.mirror.g, a.mirror.b, a.error});
     };

@@ -361,18 +361,20 @@ def evaluate(tool, model, values, wi, wo):
     return read_csv(text)[1][:, :3]
 
 
-def albedo_and_mirror(tool, model, values, cosines, phi=0.0):
+def albedo_and_mirror(tool, model, values, cosines, phi=0.0, error=1e-5):
     """Directional albedo of the model by quadrature, and the weight of its mirror term, which the
-    albedo includes; (n, 3) each."""
+    albedo includes; (n, 3) each. `error`: below what pictures show; a hundredth of it takes up to
+    ten times as long."""
     stdin = to_csv(("cos_theta_o",), np.reshape(cosines, (-1, 1)))
-    text = tool("albedo", model, *arguments(values), "--phi", repr(float(phi)), stdin=stdin)
+    options = ("--phi", repr(float(phi)), "--error", repr(error))
+    text = tool("albedo", model, *arguments(values), *options, stdin=stdin)
     rows = read_csv(text)[1]
     return rows[:, 1:4], rows[:, 4:7]
 
 
-def albedo(tool, model, values, cosines, phi=0.0):
+def albedo(tool, model, values, cosines, phi=0.0, error=1e-5):
     """Directional albedo of the model by quadrature, (n, 3)."""
-    return albedo_and_mirror(tool, model, values, cosines, phi)[0]
+    return albedo_and_mirror(tool, model, values, cosines, phi, error)[0]
 
 
 def draw(tool, model, values, wo, count):

@@ -148,6 +148,7 @@ def test_a_file_of_measurements_sets_glass(extension, empty, tmp_path):
     assert extension.api.get_parameters(glass) == before
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     ("model", "own", "other"),
     [
@@ -180,6 +181,7 @@ def test_a_substance_that_a_scenes_own_extension_lacks(
     assert api.get_parameters(material) == before
 
 
+@pytest.mark.long
 def test_nothing_remains_of_an_earlier_substance(extension, empty, tmp_path):
     """Neither its absorption nor a metal's tint; and a new glass is green until it is told."""
     api, clear = extension.api, tmp_path / "clear.csv"

@@ -232,6 +232,7 @@ def test_plastic_is_near_without_osl(convert, empty, roughness, ior):
         assert plan.error < worst
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("roughness", [0.0, 0.2, 0.6])
 @pytest.mark.parametrize(
     "inputs",
@@ -259,6 +260,7 @@ def test_a_picture_of_a_high_ior_is_as_before(extension, convert, empty, inputs,
     assert np.abs(np.array(after) - before).max() < 0.006
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("osl", [False, True])
 @pytest.mark.parametrize("roughness", [0.3, "linked"])
 @pytest.mark.parametrize("normal", [(0.3, -0.8, 0.5), (0.9, 0.1, 0.4)], ids=["bent", "away"])
@@ -338,6 +340,7 @@ def test_a_metal_is_the_microfacet_model(convert, roughness):
         assert plan.values["f0"] == pytest.approx(GOLD)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("distribution", ["GGX", "MULTI_GGX"])
 @pytest.mark.parametrize("color", [(0.05, 0.05, 0.05), (0.05, 0.03, 0.01), GOLD])
 def test_a_dark_glossy_node_is_near(extension, convert, empty, color, distribution):
@@ -365,6 +368,7 @@ def test_a_dark_glossy_node_is_near(extension, convert, empty, color, distributi
     assert max(errors) < 0.025
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("distribution", ["GGX", "MULTI_GGX"])
 @pytest.mark.parametrize(
     ("inputs", "worst"),
@@ -444,6 +448,7 @@ def test_white_facets_lose_no_light(extension, convert, alpha):
         assert albedo == pytest.approx(1, abs=1e-3)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("osl", [False, True])
 @pytest.mark.parametrize("roughness", [0.8, "linked"])
 def test_a_picture_of_a_rough_metal_is_as_before(extension, convert, empty, roughness, osl):
@@ -477,6 +482,7 @@ FOLLOWED = {
 }
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("osl", [False, True])
 @pytest.mark.parametrize("distribution", ["GGX", "MULTI_GGX"])
 @pytest.mark.parametrize("socket", FOLLOWED)
@@ -519,6 +525,7 @@ def ball_before_a_sky(scene, material, size, samples, osl):
     scene.cycles.shading_system, scene.cycles.max_bounces = osl, 12
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("osl", [False, True])
 @pytest.mark.parametrize(
     ("color", "more"),
@@ -586,6 +593,7 @@ def tinted_glass(kind, color):
     return material, node
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("osl", [False, True])
 @pytest.mark.parametrize("color", [(0.8, 0.8, 0.8), (0.9, 0.3, 0.05), None])
 @pytest.mark.parametrize("kind", ["glass", "principled"])
@@ -1230,6 +1238,7 @@ def test_a_link_that_blender_ignores_is_no_link(extension, convert, empty, ignor
     assert extension.model_nodes.constants(base)["rho"] is not None
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("kind", ["VolumeAbsorption", "VolumeScatter", "VolumePrincipled"])
 def test_a_volume_in_a_surface_shows_nothing_and_is_no_reason(extension, convert, empty, kind):
     """glTF's importer adds one to the surface of glass."""
@@ -1306,6 +1315,7 @@ def test_nodes_that_are_not_used_are_not_converted(extension, convert):
     assert convert.apply([plan]) == 0 and node.outputs[0].is_linked
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("mapped", [None, "Base Color", "Metallic", "Roughness", "Normal"])
 def test_an_object_that_glows_stays_a_lamp(extension, convert, empty, mapped):
     """Whatever varies in the rest of its material."""
@@ -1441,6 +1451,7 @@ def has_a_colour_by_an_image(material, node):
     tree.links.new(picture.outputs["Color"], node.inputs["Base Color"])
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     "change",
     [
@@ -1600,6 +1611,7 @@ def test_the_error_of_nodes_is_a_range_over_their_values(convert, name):
         assert plan.least_error * 0.9 - 0.003 < error < plan.error * 1.1 + 0.003
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("color", [0.0, 0.04, 0.5, 1.0])
 def test_a_picture_of_a_linked_colour_is_off_as_is_said(extension, convert, empty, color):
     """Under a lamp as wide as windows, for which the error is stated."""

@@ -75,6 +75,7 @@ def a_strip(node):
 CHANGES = [color_of_metal, roughness, metallic, alpha_and_emission, a_driver, a_strip]
 
 
+@pytest.mark.many
 @pytest.mark.slow
 @pytest.mark.parametrize("distribution", ["GGX", "MULTI_GGX"])
 @pytest.mark.parametrize("change", CHANGES)

@@ -99,6 +99,7 @@ def assert_as_before(extension, scene, material):
     return plans
 
 
+@pytest.mark.many
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "inputs", "change"), CASES)
 def test_a_picture_of_anisotropy_is_as_before(extension, convert, empty, kind, inputs, change):
@@ -115,6 +116,7 @@ def test_the_tangent_shows(convert, empty):
     assert off(before, ball(empty, material)) > 0.1
 
 
+@pytest.mark.many
 @pytest.mark.slow
 @pytest.mark.parametrize("rough", ["constant", "linked"])
 @pytest.mark.parametrize(("kind", "inputs"), [METAL, PLASTIC])

@@ -85,6 +85,7 @@ def test_a_node_in_a_group_is_converted_for_all_materials(extension, convert):
     assert not [g for g in bpy.data.node_groups if extension.model_nodes.TAG in g]
 
 
+@pytest.mark.many
 @pytest.mark.slow
 @pytest.mark.parametrize("osl", [False, True])
 @pytest.mark.parametrize("distribution", ["GGX", "MULTI_GGX"])
@@ -127,6 +128,7 @@ FORMS = [
 ]
 
 
+@pytest.mark.many
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "color", "values", "form"), FORMS)
 def test_every_form_works_in_a_group(extension, convert, empty, kind, color, values, form):

@@ -172,6 +172,7 @@ def shown_by(socket):
     return socket.identifier, kind, own, *map(shown_by, node.inputs)
 
 
+@pytest.mark.many
 @pytest.mark.slow
 @pytest.mark.parametrize("state", STATES)
 def test_a_picture_is_as_before_whatever_is_set(extension, convert, empty, third_of, state):

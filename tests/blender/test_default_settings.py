@@ -181,6 +181,7 @@ def moving_material(extension, model="lambertian_specular"):
     return material
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     ("kind", "watts", "warned"),
     [("SUN", 1, False), ("SPOT", 1000, False), ("AREA", 20, False), ("AREA", 1000, True)],
@@ -412,6 +413,7 @@ def room_of(extension, material):
     return slots, cones
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("form", ["auto", "nodes"])
 def test_nodes_have_room_for_the_lamps_of_the_scene(extension, new_file, form):
     """Empty slots cost time before the first sample. A lamp without a size that has no slot in the

@@ -284,8 +284,10 @@ def test_every_choice_reaches_the_shader(extension, empty, few_of, subtests):
     assert tested
 
 
-def test_sockets_equal_the_manifest(extension, made_forms, subtests):
+def test_sockets_equal_the_manifest(extension, made_forms, third_of, subtests):
+    """And an Albedo output is added to a third of the forms, which compiles a shader for most."""
     manifest = json.loads((extension.pack.root / "manifest.json").read_text())
+    adding = {(model, representation) for model, representation, _ in third_of(made_forms)}
     for model, representation, material in made_forms:
         node = extension.model_nodes.group_nodes(material)[0]
         sockets = extension.model_nodes.sockets(node)
@@ -338,6 +340,8 @@ def test_sockets_equal_the_manifest(extension, made_forms, subtests):
             continue
         apart = extension.pack.model(model).forms[representation].has_albedo_script
         assert [s.name for s in node.outputs] == (["BSDF"] if apart else ["BSDF", "Albedo"])
+        if (model, representation) not in adding:
+            continue
         extension.nodes.add_albedo(node)
         assert [s.name for s in node.outputs] == ["BSDF", "Albedo"]
 
@@ -351,6 +355,7 @@ def test_one_group_a_form(extension, empty):
     assert extension.api.get_parameters(second)["r0"] == pytest.approx(0.2)
 
 
+@pytest.mark.long
 def test_values_round_trip(extension, empty, subtests):
     for model, entry in extension.api.models().items():
         values = {}

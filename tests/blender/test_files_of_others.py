@@ -62,6 +62,7 @@ def test_what_is_not_finite_is_black_and_what_is_negative_stays(empty, tmp_path)
     np.testing.assert_allclose(seen[kept], pixels[kept], atol=1e-6)
 
 
+@pytest.mark.many
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "config",

@@ -70,6 +70,7 @@ def pictures(scene, floor, material):
     return seen
 
 
+@pytest.mark.many
 @pytest.mark.slow
 @pytest.mark.parametrize(("node", "differs"), CASES)
 def test_convert_says_whether_the_setting_shows(extension, convert, empty, node, differs):

@@ -63,6 +63,7 @@ def light_of(scene, samples=64):
 # ---- documented code -----------------------------------------------------------------------------
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("page", ["README.md", "docs/blender.md"])
 def test_documented_code_shows_the_material_in_a_new_file(extension, page):
     text = (ROOT / page).read_text(encoding="utf-8")
@@ -261,6 +262,7 @@ def test_a_world_that_can_not_be_followed(extension, empty):
     assert "Sky, bright spot 1: its vector or projection" in messages["not_aimed"]
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_lamps_that_take_light_are_aimed_at(extension, empty):
     """Lamps of negative power: random rays can't hit one without a size, so closures account for

@@ -315,6 +315,7 @@ def test_a_textured_colour_under_a_sun(textured, tool):
     assert np.abs(white * TEXELS.mean(0) - expected).max() > 0.1 * largest
 
 
+@pytest.mark.long
 def test_a_textured_colour_in_a_white_world(textured):
     """Sampled light has the texel's colour: the mean radiance of a white material times the texel,
     within 5 standard errors. With 12 comparisons and a fixed seed, that is one false alarm in about

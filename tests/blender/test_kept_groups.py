@@ -67,6 +67,7 @@ def refuse(*_):
     raise AssertionError("made anew")
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_what_was_made_once_is_appended(extension, kept, monkeypatch):
     models = ("ward", "ashikhmin_shirley", "glass")

@@ -75,6 +75,7 @@ def studio(extension, tmp_path_factory):
     return path
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("osl", [False, True])
 @pytest.mark.parametrize(
     ("kind", "name", "wanted"),

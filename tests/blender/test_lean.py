@@ -59,6 +59,7 @@ def picture(extension, material):
     return found
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_lean_materials_show_the_same_and_hold_less(extension, used, tmp_path):
     api = extension.api
@@ -116,6 +117,7 @@ def test_lean_materials_show_the_same_and_hold_less(extension, used, tmp_path):
     )
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_farm_renders_a_lean_file_and_its_moving_lamp(
     extension, empty, kept_program, monkeypatch, tmp_path

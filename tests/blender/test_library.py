@@ -18,6 +18,8 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+#: Making the library takes most of the time of these tests.
+LIBRARY = pytest.mark.together("library")
 
 
 @pytest.fixture(scope="module")
@@ -108,6 +110,7 @@ def test_a_model_of_which_nothing_is_made_is_there_with_its_defaults(
         library.entries()
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_what_needs_open_shading_language_says_so(extension, library, empty, third_of):
     empty.cycles.shading_system = False
@@ -139,6 +142,7 @@ def test_every_picture_is_of_the_material_that_is_listed(library, monkeypatch):
 # In the Asset Browser
 
 
+@LIBRARY
 def test_catalogues_and_what_is_said_of_each_material(extension, library, made, empty, subtests):
     lines = (made.folder / library.CATALOGS).read_text(encoding="utf-8").splitlines()
     assert lines[0] == "VERSION 1"
@@ -175,6 +179,7 @@ def test_catalogues_and_what_is_said_of_each_material(extension, library, made, 
             assert np.abs(shown - meant).max() < 0.01
 
 
+@LIBRARY
 def test_the_second_blender_keeps_its_nodes_for_this_one(extension, made, empty):
     """And finds those that this one kept: making them takes seconds for each model."""
     kept = importlib.import_module(f"{extension.package}.content.kept_groups")
@@ -187,6 +192,7 @@ def test_the_second_blender_keeps_its_nodes_for_this_one(extension, made, empty)
     assert sorted(Path(folder).iterdir()) == files, "it is appended"
 
 
+@LIBRARY
 def test_one_click_adds_it_and_one_takes_it_away(
     extension, library, made, empty, monkeypatch, tmp_path
 ):
@@ -222,12 +228,14 @@ def test_one_click_adds_it_and_one_takes_it_away(
     assert sorted(item.name for item in libraries) == sorted(before) and library.is_current()
 
 
+@LIBRARY
 def test_making_it_shows_how_much_is_done(library, made):
     *shares, last = made.shares
     assert last is None and shares == sorted(shares) and 0 <= shares[0] and shares[-1] < 1
     assert len(set(shares)) > 3 and library.is_current()
 
 
+@LIBRARY
 @pytest.mark.parametrize(
     ("command", "message"),
     [
@@ -246,6 +254,7 @@ def test_a_library_that_can_not_be_made(extension, library, made, monkeypatch, c
     assert {p.name: p.stat().st_mtime_ns for p in made.folder.iterdir()} == files
 
 
+@LIBRARY
 def test_making_it_may_be_given_up(library, made):
     files = {p.name: p.stat().st_mtime_ns for p in made.folder.iterdir()}
     job = library.Making()
@@ -274,6 +283,7 @@ def assert_aims_at(extension, material, lamp):
     assert [s.default_value for s in first.inputs] == pytest.approx(list(lamp.location))
 
 
+@LIBRARY
 @pytest.mark.parametrize(
     ("by_hand", "osl", "faint"),
     [(True, True, 0), (False, True, 0), (True, False, 0), (False, False, 0), (False, False, 3)],
@@ -314,6 +324,7 @@ def test_dragging_brings_nothing_twice_and_finds_the_lamps(
     assert not ball.active_material.asset_data
 
 
+@LIBRARY
 def test_a_group_that_differs_does_not_give_way(extension, made, empty):
     mine = extension.api.new_material("ward")
     (node,) = extension.model_nodes.group_nodes(mine)
@@ -325,6 +336,7 @@ def test_a_group_that_differs_does_not_give_way(extension, made, empty):
     assert len([g for g in bpy.data.node_groups if g.name.startswith("brdfc Lamps")]) == 1
 
 
+@LIBRARY
 def test_what_is_asked_for_by_name_stays(extension, made, empty):
     """The user, or a script, may be using a group that was appended by name."""
     extension.api.new_material("ward")
@@ -334,6 +346,7 @@ def test_what_is_asked_for_by_name_stays(extension, made, empty):
     assert group.name == "Ward (auto).001" and extension.model_nodes.TAG in group
 
 
+@LIBRARY
 def test_undo_of_a_drag(extension, made, empty):
     ball = helpers.add_sphere(empty, extension.api.new_material("ward"), segments=8)
     lamp = helpers.add_lamp(empty, name="Key", location=(1, 2, 3), energy=100)
@@ -361,7 +374,8 @@ def test_undo_of_a_drag(extension, made, empty):
     assert_aims_at(extension, bpy.data.materials["Brushed Steel"], bpy.data.objects["Key"])
 
 
-@pytest.mark.long
+@LIBRARY
+@pytest.mark.full
 def test_every_material_is_as_the_same_one_made_by_hand(
     extension, library, made, empty, few_of, subtests
 ):
@@ -381,6 +395,7 @@ def test_every_material_is_as_the_same_one_made_by_hand(
             assert said == meant
 
 
+@LIBRARY
 @pytest.mark.evidence
 @pytest.mark.full
 def test_dragged_materials_render_as_those_made_by_hand(extension, library, made, empty, subtests):

@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 
 pytestmark = pytest.mark.usefixtures("by_the_tool")
+#: Fitting every model to a file takes most of the time of these tests.
+FITS = pytest.mark.together("measured fits")
 
 
 def direction(theta, phi):
@@ -61,6 +63,7 @@ def found(extension, paint):
     return extension.api.measured_fits(paint)
 
 
+@FITS
 def test_what_a_file_holds(paint, found):
     assert found.isotropic and found.path == paint
     # Of models whose errors hardly differ, the simpler one comes first. No data hold a mirror.
@@ -74,6 +77,7 @@ def test_what_a_file_holds(paint, found):
         found.fit("minnaert")
 
 
+@FITS
 @pytest.mark.parametrize("model", ["ward", "factors"])
 def test_a_material_of_a_file(extension, empty, found, model):
     material = extension.api.new_measured_material(found, model)
@@ -107,6 +111,7 @@ def test_matte_light_is_added(extension, empty, write_table):
     assert seen[0] - seen[1] == pytest.approx(0.4, rel=0.05)
 
 
+@FITS
 def test_the_sum_of_lobes_is_added_up(extension, empty, found):
     """A node a lobe, whose sum leads to the output; nothing is left after an error."""
     best = found.lobe_sum()
@@ -222,6 +227,7 @@ def two_colored(write_table):
     return write_table("paint.csv", "ward", matte=0.2, ks=(0.2, 0.1, 0.05), ax=0.2, ay=0.2)
 
 
+@pytest.mark.many
 @pytest.mark.slow
 @pytest.mark.parametrize("osl", [True, False])
 def test_blender_and_the_reference_have_one_sum(ball, in_blender, osl):
@@ -247,6 +253,7 @@ LAYERS = {
 }
 
 
+@pytest.mark.many
 @pytest.mark.slow
 @pytest.mark.parametrize("osl", [True, False])
 def test_blender_and_the_reference_have_the_same_layers(ball, in_blender, osl):
@@ -297,6 +304,7 @@ def test_nothing_to_coat(extension, empty):
             extension.api.add_coat(material)
 
 
+@pytest.mark.many
 @pytest.mark.slow
 @pytest.mark.parametrize("osl", [True, False])
 def test_curves_look_as_the_data_do(ball, in_blender, two_colored, osl):
@@ -312,8 +320,16 @@ def test_curves_look_as_the_data_do(ball, in_blender, two_colored, osl):
     np.testing.assert_allclose(got.mean((0, 1)), data.mean((0, 1)), rtol=0.02)
 
 
+@FITS
 @pytest.mark.slow
-def test_the_operator_makes_the_closest(extension, empty, paint):
+def test_the_operator_makes_the_closest(extension, empty, paint, found, monkeypatch):
+    # Fitting all models once more takes ten seconds.
+    fits = extension.api.measured_fits
+    monkeypatch.setattr(
+        extension.api,
+        "measured_fits",
+        lambda path: found if str(path) == str(paint) else fits(path),
+    )
     ball = helpers.add_sphere(empty, None)
     bpy.context.view_layer.objects.active = ball
     assert bpy.ops.brdfc.new_measured_material(filepath=str(paint)) == {"FINISHED"}

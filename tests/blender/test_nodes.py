@@ -295,6 +295,7 @@ def sunken_ball(scene):
     add_lamp(scene, "POINT", "Ball", (0, -1.2, -0.1), energy=200, shadow_soft_size=0.5)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("light", [upright_lamp, sunken_ball], ids=lambda f: f.__name__)
 def test_a_floor_beside_a_lamp_that_is_half_below_it(extension, empty, light):
     """Seen against the light, the lamp keeps its closures. If it were left to random directions,
@@ -336,6 +337,7 @@ def small_strip(scene):
     )  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_small_strip(extension):
     """Closures within it are so faint that they would be kept at random. So it has a single cone
@@ -348,6 +350,7 @@ def test_a_small_strip(extension):
     assert noise < 0.01, noise
 
 
+@pytest.mark.many
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "mean_limit", "block_limit"),
@@ -498,6 +501,7 @@ def metallic(**inputs):
     return material
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     ("values", "inputs"),
     [
@@ -719,6 +723,7 @@ def test_albedo_in_a_white_world(extension, empty, tool):
     np.testing.assert_allclose(found, albedo(tool, "cook_torrance", values, [1.0])[0], rtol=3e-3)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_choices_of_automatic_materials(extension, empty):
     """With OSL off they reach the form inside the group, also as menus (from Blender 5.0 on)."""

@@ -134,6 +134,7 @@ QUIET = {
 }
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(("model", "values"), EXACT)
 def test_furnace_of_exact_form(extension, empty, tool, batch, request, model, values):
     cosines = np.linspace(0.01, 1, 64)
@@ -497,6 +498,7 @@ TABLES = with_every_model(
 )
 
 
+@pytest.mark.many
 @pytest.mark.sample(6)
 @pytest.mark.parametrize(
     ("model", "values"), [case for case in TABLES if case[0] not in WITHOUT_ALBEDO]
@@ -504,7 +506,7 @@ TABLES = with_every_model(
 def test_albedo_output_panel_and_model_agree(extension, empty, tool, model, values):
     cosines = np.linspace(0.02, 1, 50)
     entry = extension.pack.model(model).entry
-    quadrature = albedo(tool, model, values, cosines)
+    quadrature = albedo(tool, model, values, cosines, error=1e-7)
     if entry.get("albedo"):
         expected = np.array([extension.api.albedo(model, c, **values) for c in cosines])
         complete = {p["name"]: p["default"] for p in entry["parameters"]} | values
@@ -541,6 +543,7 @@ WIDTHS = {
 }
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     "model",
     [*WIDTHS, "charlie", "coupled", "glossy_reflector", "glossy_specular", "oren_nayar"],

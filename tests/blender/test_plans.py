@@ -69,6 +69,7 @@ def seen_at(extension, material, name="r0"):
     return values
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("animate", [key, by_driver, by_strip, by_name, by_the_material])
 def test_what_is_animated_stays_an_input_and_moves(extension, empty, api, animate):
     material = api.new_material("cook_torrance", "sampled", m=0.05)
@@ -222,6 +223,7 @@ def groups():
     }
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_stale_plan_is_refused_and_nothing_changes(used, change):
     apply, said = CHANGES[change]

@@ -158,6 +158,7 @@ def light_of(extension, plots, form_light, material):
     return plots.light(model, values, form)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     ("model", "form", "values", "over"),
     [
@@ -459,6 +460,7 @@ TWINS = {
 }
 
 
+@pytest.mark.long
 def test_the_curve_of_a_twin_is_that_of_the_tool(off_the_tool, extension, empty):
     """Blender's nodes are in single precision."""
     for model, values in TWINS.items():

@@ -16,6 +16,9 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
+#: Making two repositories takes most of the time of these tests.
+pytestmark = pytest.mark.together("repository")
+
 CLI = Path(bpy.utils.resource_path("LOCAL")) / "scripts/addons_core/bl_pkg/cli/blender_ext.py"
 #: What distinguishes the older version from the newer one.
 OLDER, MARK, LEFT_BEHIND = "0.0.1", "\nMARK = 'older'\n", "lamps/left_behind.py"

@@ -517,6 +517,7 @@ def test_driver_renders_and_reports(extension, extension_zip, empty, scene_file,
     assert "[3/3]" in done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_pictures_of_two_seeds_share_no_sample(extension_zip, empty, tool, tmp_path):
     """The first sample goes through the pixel's centre; with it, a form that samples directions

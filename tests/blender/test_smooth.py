@@ -67,6 +67,7 @@ def mirror():
     )
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_converted_mirror_is_as_it_was_and_so_are_its_settings(extension, shape):
     """A third of a cube's pixels used to be black, even after converting back."""
@@ -126,6 +127,7 @@ def darkness_of_glossy(extension):
     return dark(*picture(extension, "cylinder", native("ShaderNodeBsdfAnisotropic", Roughness=0.3)))
 
 
+@pytest.mark.many
 @pytest.mark.sample(12)
 @pytest.mark.parametrize("correction", [None, True, False])
 @pytest.mark.parametrize(("model", "form"), EVEN + OTHERS)

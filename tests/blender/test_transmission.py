@@ -62,6 +62,7 @@ def test_slab_absorbs_along_the_way(extension, empty, thickness):
 VIEWS = [(1, 0.9), (1, 0.25), (-1, 0.9), (-1, 0.4)]  # side and cosine; the last is beyond the angle
 
 
+@pytest.mark.many
 @pytest.mark.slow
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(("n", "ior"), [(0.0, 1.5), (20.0, 1.3)])

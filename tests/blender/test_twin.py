@@ -150,6 +150,7 @@ TWO_WIDTHS = {
 }
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("model", TWO_WIDTHS)
 def test_both_widths_show_where_shaders_do_not_run(extension, balls, model):
     """Blender's nodes in their place, as in EEVEE, are like the model at every width."""

@@ -96,6 +96,7 @@ def draw(tool, model, values, wo):
     return rows[:, 3:6].mean(1), np.where(rows[:, 6] > 0, rows[:, 2], 1)
 
 
+@pytest.mark.many
 @pytest.mark.sample(5)
 @pytest.mark.parametrize(("model", "values"), CASES)
 def test_drawn_form_is_as_noisy_as_its_sampler(

@@ -161,8 +161,8 @@ TEST(Checks, SayWhyOneDoesNotApply) {
 }
 TEST(Checks, AreTheSameNumberForEveryModelAndHaveALimit) {
   std::set<std::size_t> numbers;
-  for (const auto& [name, model] : models()) {
-    const std::vector<Row> rows = check_model(*model, {.effort = 0.01});
+  for (const std::string& name : third_of(model_names())) {
+    const std::vector<Row> rows = check_model(find_model(name), {.effort = 0.01});
     numbers.insert(rows.size());
     for (const Row& r : rows) EXPECT_LT(std::abs(r.limit), 100) << name << ": " << r.check;
   }

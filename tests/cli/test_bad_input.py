@@ -137,6 +137,7 @@ def picture(tmp_path):
     return tmp_path / "good.exr"
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("kept", [0, 3, 100, 0.5, 0.99])
 def test_a_truncated_picture(picture, kept, tmp_path):
     data = picture.read_bytes()
@@ -145,6 +146,7 @@ def test_a_truncated_picture(picture, kept, tmp_path):
     refused(run("compare", bad, picture), "bad.exr")
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(("width", "height"), [(60000, 60000), (2**31 - 1, 1), (30000, 1), (0, 5)])
 def test_a_header_that_promises_too_much(picture, width, height, tmp_path):
     bad = tmp_path / "bad.exr"

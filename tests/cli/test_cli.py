@@ -243,6 +243,7 @@ def test_every_option_that_is_a_number_is_checked_as_one():
         )
     found = {(c, o) for c in commands() for o in numbers_of(c)}
     assert found >= {
+        ("albedo", "--error"),
         ("albedo", "--phi"),
         ("base", "--angles"),
         ("build", "--error"),
@@ -374,6 +375,17 @@ def test_albedo_turns_with_the_azimuth_of_an_anisotropic_model():
     (turned,) = rows(run(*args, f"rotation={math.pi / 2}", "--phi", str(math.pi / 2), stdin=stdin))
     assert abs(along["albedo_r"] - across["albedo_r"]) > 0.01
     assert turned["albedo_r"] == pytest.approx(along["albedo_r"], abs=1e-5)
+
+
+def test_albedo_is_as_good_as_it_is_asked_to_be():
+    stdin = "cos_theta_o\n0.3\n0.8\n"
+    best = rows(run("albedo", "ward", "--error", "1e-9", stdin=stdin))
+    for error in (1e-3, 1e-5):
+        for row, truth in zip(
+            rows(run("albedo", "ward", "--error", str(error), stdin=stdin)), best, strict=True
+        ):
+            assert 0.01 * error < row["error_estimate"] <= error
+            assert row["albedo_g"] == pytest.approx(truth["albedo_g"], abs=2 * error)
 
 
 @pytest.mark.parametrize("cosine", ["0", "-0.5", "1.0001", "nan", "abc"])
@@ -520,6 +532,7 @@ def test_check_scales_with_the_effort_asked_for():
     assert few["values"] < many["values"] / 4
 
 
+@pytest.mark.long
 def test_errors_of_stored_fits_are_the_table_of_their_page():
     script = ROOT / "evidence" / "forms_table.py"
     command = [sys.executable, script, "--tool", TOOL, "fits-over"]

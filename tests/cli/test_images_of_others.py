@@ -103,6 +103,7 @@ def test_a_texture_beyond_the_range_ends_there(tmp_path):
     assert pixels[0].tolist() == [[0.5, 0, 0.5], [0, 0, 0]]
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("space", SPACES)
 @pytest.mark.parametrize(
     ("primaries", "name"),
@@ -218,6 +219,7 @@ def written(folder, name):
     return path
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("name", [n for n in BUILT_IN if n.endswith("ocio-v2.1")])
 def test_configurations_of_aces(tmp_path, name):
     """The configurations' own names for sRGB, the linear spaces and the default view are found."""

@@ -49,6 +49,7 @@ def test_it_takes_its_data_from_beside_itself(installed):
     assert run(link, "where").stdout == done.stdout
 
 
+@pytest.mark.long
 def test_it_lists_and_builds_what_the_built_one_does(installed, tmp_path):
     program = installed / "bin" / "brdfc"
     assert "lambert" in run(program, "list").stdout

@@ -267,6 +267,7 @@ def angle_table(*columns):
     return "theta_i,phi_i,theta_o,phi_o,r,g,b\n" + rows + "\n"
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("options", [[], ["--lobes", "2"], ["--models", "ward"]])
 def test_nothing_is_fitted_to_a_few_rows(tmp_path, options):
     """Fits of all models, which take longest, are made of larger tables in other tests."""
@@ -752,6 +753,7 @@ ALTA = (
 )
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("name", ALTA)
 def test_alta_text_is_what_it_was_made_from(tmp_path, name):
     x, light, view, f = alta_file(name)
@@ -845,6 +847,7 @@ def test_values_of_alta_that_the_cosine_weights(tmp_path):
     np.testing.assert_allclose(pairs(file, i, o)[0], expected, rtol=0.01)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("turn", [0, 0.25, 0.5, 1])
 def test_what_a_tensor_file_reflects_is_what_is_sampled(tmp_path, turn):
     """The weight of a sample is nearly the albedo, whatever is drawn: relative variances are up to
@@ -1002,6 +1005,7 @@ def rendered(folder, material, *options, **changes):
     return oiio.ImageBuf(str(folder / "s.exr")).get_pixels(oiio.FLOAT)[..., :3], done.stderr
 
 
+@pytest.mark.many
 @pytest.mark.slow
 @pytest.mark.parametrize("strategy", ["brdf", "mis"])
 def test_the_reference_renders_data_as_they_are(tmp_path, merl_file, strategy):
@@ -1091,6 +1095,7 @@ def test_sums_of_lobes_are_told(tmp_path):
         assert done.returncode == 2 and expected in done.stderr, done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_scene_has_the_sum_that_is_fitted(tmp_path):
     """In the reference the sum is nearly the data, by every way of sampling, and the resolved scene

@@ -151,6 +151,7 @@ def random_values(model, random):
     return values
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("name", MODELS)
 def test_values_are_those_on_numpy(brdfc, library, name):
     model, random = brdfc.model(name), np.random.default_rng(1)
@@ -223,6 +224,7 @@ def functions(wi, wo, u):
     return {"eval": both, "pdf": both, "sample": [wo, u], "mirror": [wo], "transmit": [wo]}
 
 
+@pytest.mark.many
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 def test_gradients_are_finite_differences(brdfc, differentiating, name):
@@ -289,6 +291,7 @@ def ends():
     yield from [(wo * [-1, -1, 1], wo), (flat, wo), (wi, flat), (flat, flat)]
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("precision", [np.float32, np.float64])
 @pytest.mark.parametrize("name", MODELS)
 def test_gradients_are_numbers_everywhere(brdfc, differentiating, name, precision):

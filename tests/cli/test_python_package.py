@@ -47,7 +47,7 @@ def brdfc(folder):
         sys.path.remove(str(folder))
 
 
-def tool(command, model, values, rows, header):
+def tool(command, model, values, rows, header, *options):
     """The tool's results, one row for each."""
     words = [
         f"{k}={v if isinstance(v, str) else ','.join(repr(float(c)) for c in np.atleast_1d(v))}"
@@ -55,7 +55,10 @@ def tool(command, model, values, rows, header):
     ]
     lines = [header, *(",".join(repr(float(x)) for x in row) for row in rows)]
     done = subprocess.run(
-        [TOOL, command, model, *words], input="\n".join(lines), capture_output=True, text=True
+        [TOOL, command, model, *words, *options],
+        input="\n".join(lines),
+        capture_output=True,
+        text=True,
     )
     assert done.returncode == 0, done.stderr
     return np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1, ndmin=2)
@@ -203,6 +206,7 @@ def test_samples_below_the_surface_are_lost(brdfc, name):
         assert (found == [0, 0, 1, 0, 0, 0, 0]).all()
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("name", MODELS)
 def test_samples_are_those_of_the_formulas_in_cpp(brdfc, name):
     model, random = brdfc.model(name), np.random.default_rng(6)
@@ -231,6 +235,7 @@ def test_samples_are_those_of_the_formulas_in_cpp(brdfc, name):
     assert some > 100
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("name", MODELS)
 def test_albedo_is_that_of_the_tools_quadrature(brdfc, name):
     """By 4096 samples, as docs/python.md states; the mirror's fraction, which is not an integral,
@@ -238,7 +243,8 @@ def test_albedo_is_that_of_the_tools_quadrature(brdfc, name):
     model, random = brdfc.model(name), np.random.default_rng(7)
     cosines = np.array([0.2, 0.7, 1])
     for values in ({}, random_values(model, random)):
-        expected = tool("albedo", name, values, cosines[:, None], "cos_theta_o")
+        error = ("--error", "1e-5")  # less takes seconds
+        expected = tool("albedo", name, values, cosines[:, None], "cos_theta_o", *error)
         sine = np.sqrt((1 - cosines) * (1 + cosines))
         wo = np.stack([sine, 0 * sine, cosines], axis=-1)
         assert off(model.mirror(wo, **values), expected[:, 4:7]) <= 1e-12, values

@@ -323,6 +323,7 @@ def two_scenes(tmp_path_factory):
     return folder, reported(folder)
 
 
+@pytest.mark.many
 @pytest.mark.skipif(CHROMIUM is None, reason="chromium is missing: the page is seen by nobody")
 @pytest.mark.parametrize("width", [WIDE, NARROW])
 def test_the_page_in_a_browser(tmp_path, two_scenes, width):

@@ -14,6 +14,9 @@ from pathlib import Path
 import pytest
 from support import MODELS, ROOT, TOOL
 
+#: Making the wheels takes most of the time of these tests.
+pytestmark = pytest.mark.together("wheels")
+
 VERSION = re.search(r"project\(brdfc VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text())[1]
 
 sys.path.insert(0, str(ROOT / "python" / "tool"))

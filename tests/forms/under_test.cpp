@@ -34,8 +34,10 @@ bool exceeds_a_little(const std::string& name) {
 }
 
 TEST(Under, ExceedsTheModelByALittleOfItsLightAtMost) {
-  for (const auto& [name, m] : models()) {
-    if (!exceeds_a_little(name)) continue;
+  std::vector<std::string> names = model_names();
+  std::erase_if(names, [](const std::string& name) { return !exceeds_a_little(name); });
+  for (const std::string& name : third_of(names)) {
+    const Model* m = &find_model(name);
     measure::Random random(14);  // the same values whatever other models there are
     for (const ParamValues& values : cases_of(m->info())) {
       const measure::BoundModel bound = measure::bind_model(*m, values);

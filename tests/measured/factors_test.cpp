@@ -4,6 +4,7 @@
 
 #include "measured/fit_factors.h"
 #include "measured/sum_table.h"
+#include "support.h"
 
 namespace brdfc::measured {
 namespace {
@@ -48,7 +49,7 @@ TEST(FitFactors, OnlyAModelOfCurvesHasCurves) {
 }
 
 TEST(FitFactors, FacetsThatNoOtherModelHereIsAreFound) {
-  for (const double alpha : {0.07, 0.15, 0.3, 0.5, 0.8})
+  for (const double alpha : third_of(std::vector{0.07, 0.15, 0.3, 0.5, 0.8}))
     EXPECT_LT(fitted(std::make_shared<Ggx>(alpha)).error, 0.01) << alpha;
 }
 
@@ -101,7 +102,7 @@ TEST(FitFactors, BlackDataAreBlack) {
 
 // Curves that are found with few pairs may be anything between these.
 TEST(FitFactors, NoPeakIsFurtherOffThanAMatteSurface) {
-  for (const double alpha : {3e-4, 0.003, 0.01, 0.04}) {
+  for (const double alpha : third_of(std::vector{3e-4, 0.003, 0.01, 0.04})) {
     const auto data = std::make_shared<Ggx>(alpha);
     Measurement m;
     m.file = "made";

@@ -100,6 +100,7 @@ def test_files_that_are_not_measured_are_refused(tmp_path, demo):
     assert done.returncode == 2 and "expected files of different names, got bad" in done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_page_of_a_file(tmp_path, demo):
     """Two lobes, of which a sum of lobes misplaces less than a model; a second run starts no

@@ -107,6 +107,7 @@ def pixels(file):
     return oiio.ImageBuf(str(file)).get_pixels(oiio.FLOAT).tobytes()
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_farm_renders_what_one_process_does_though_a_worker_is_killed(farm, tmp_path):
     for python in (FARM, BLENDER):
