@@ -853,7 +853,7 @@ def kelemen_albedo(p, cos_o):
     return [half_albedo(one, lambda p: p["m"])(p, cos_o) + matte] * 3
 
 
-# ---- Edwards et al. 2006, the disk of sec. 4, with the lump of BRDF Explorer's edwards06.brdf -----
+# ---- Edwards et al. 2006, with the lump of BRDF Explorer's edwards06.brdf ----------------------
 
 
 def edwards_point(wi, wo):
@@ -865,8 +865,8 @@ def edwards_point(wi, wo):
 
 
 def edwards_pdf(p, wi, wo):
-    """The lump, carried to the disk by the automorphism that moves the point of the mirror direction
-    to the centre."""
+    """The lump, carried to the disk by the automorphism that moves the point of the mirror
+    direction to the centre."""
     _, ko, h, oh = half(wi, wo)
     e, u, at = mp.mpf(p["e"]), edwards_point(wi, wo), -mp.mpc(ko[0], ko[1])
     below = 1 - mp.conj(at) * u
