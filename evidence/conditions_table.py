@@ -16,8 +16,8 @@ INTRODUCTION = """\
 reflected several times, under a sun and a bright sky. Each row changes one thing in it.
 
 - A cell is the change in a form's mean radiance, with its standard error.
-- It is bold if it exceeds 2 % and 5 standard errors. "panel warns" means that the panel shows a
-  warning.
+- A change is bold if it exceeds 2 % and 5 standard errors. "panel warns" means that the panel
+  shows a warning.
 - The forms stand for all others of their kind. `coupled` has r0 = 0.5, the others their defaults.
   Aimed forms know the scene's lamps. Blender's Diffuse and Glossy nodes are there for comparison.
 - `tests/blender/test_every_fit.py` measures the same for fitted forms and twins of every model, and
@@ -28,8 +28,8 @@ Some rows are measured in another way:
 
 - **smooth normals, Normal input, bump correction**: a cell is the fraction of the reflected light
   that is lost, in the worst of three views, where normals are tilted. The normals are those of the
-  mesh, those of the input *Normal*, and the same with Bump Map Correction on. A cell is bold if it
-  differs from what the model's own rays lose below the surface.
+  mesh, those of the input *Normal*, and the same with Bump Map Correction on. In these rows bold
+  means that a form loses more or less than the model's own rays do below the surface.
 - **denoising albedo, colour passes**: the mean difference from the model's albedo. **denoising
   normal**: the median angle from the true normal. **light group**: the largest difference between
   the picture and the sum of its light groups.

@@ -2,6 +2,7 @@
 """Reads the generated files of the extension: models, parameters, forms, tables. Independent of
 bpy."""
 
+import difflib
 import hashlib
 import json
 import re
@@ -85,7 +86,10 @@ def model(name):
     """A Model of this pack. Raises ValueError for an unknown name."""
     entries = manifest()["models"]
     if name not in entries:
-        raise ValueError(f"unknown model {name!r}; expected one of {', '.join(sorted(entries))}")
+        near = difflib.get_close_matches(str(name).lower(), entries, 1)
+        meant = f"did you mean {near[0]!r}? " if near else ""
+        listed = ", ".join(sorted(entries))
+        raise ValueError(f"unknown model {name!r}; {meant}expected one of {listed}")
     return Model(name, entries[name])
 
 
