@@ -378,7 +378,10 @@ def test_values_round_trip(extension, empty, subtests):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((["gloss"], {}), r"unknown model 'gloss'; did you mean 'glass'\? expected one of .*lambert"),
+        (
+            (["gloss"], {}),
+            r"unknown model 'gloss'; did you mean 'glass'\? expected one of .*lambert",
+        ),
         (
             (["coupled", "fitted"], {}),
             r"has no render method 'fitted'.*auto \(Automatic\), aimed, .*nodes \(Formula Nodes\)",
