@@ -74,7 +74,7 @@ class Native:
 def dielectric(f0, cosine):
     """Fresnel reflectance of a dielectric with reflectance f0 at normal incidence."""
     # The largest IOR that Blender's nodes take is 1,000.
-    root = min(f0, _MOST_F0) ** 0.5
+    root = np.minimum(f0, _MOST_F0) ** 0.5
     eta = (1 + root) / (1 - root)
     c = np.clip(cosine, 0, 1)
     g = np.sqrt(np.maximum(eta**2 - 1 + c**2, 0))
@@ -92,7 +92,7 @@ def mean_dielectric(f0):
 def tinted_dielectric(reflectance, f0, tint):
     """A reflectance of dielectric() or mean_dielectric() where that at normal incidence has a tint:
     (..., n) for n tints."""
-    tinted, real = f0 * np.asarray(tint, np.float64), min(f0, _MOST_F0)
+    tinted, real = f0 * np.asarray(tint, np.float64), np.minimum(f0, _MOST_F0)
     # With an IOR above 3.7 the reflectance first falls from normal incidence on; Cycles' does not.
     share = np.maximum((np.asarray(reflectance)[..., None] - real) / (1 - real), 0)
     return tinted + (1 - tinted) * share
