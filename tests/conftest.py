@@ -55,6 +55,11 @@ def pytest_addoption(parser):
         "`together`, run a third, which TEXT chooses, a commit for example",
     )
     parser.addoption(
+        "--part",
+        metavar="I/N",
+        help="run the I-th of N parts of the files, from 1",
+    )
+    parser.addoption(
         "--third-of-files",
         metavar="TEXT",
         help="run a third of the files, which TEXT chooses",
@@ -95,6 +100,10 @@ def pytest_collection_modifyitems(config, items):
         }
         long = [item for item in items if item in kept and item.get_closest_marker("long")]
         kept -= set(long) - set(third(long, text))
+    if (part := config.getoption("part")) is not None:
+        index, count = map(int, part.split("/"))
+        files = sorted({item.path for item in items})[index - 1 :: count]
+        kept -= {item for item in kept if item.path not in files}
     if (text := config.getoption("third_of_files")) is not None:
         files = sorted({item.path for item in items})
         kept = {item for item in kept if item.path in set(third(files, text))}

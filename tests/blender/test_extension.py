@@ -1310,7 +1310,7 @@ def test_search_finds_models_by_name_author_title_and_year(extension, empty):
         """Blender's search lists entries that contain all of the words."""
         return {n for n, text in texts.items() if all(w in text for w in words.lower().split())}
 
-    assert found("ward") == found("measuring anisotropic 1992") == {"ward"}
+    assert found("ward 1992") == found("measuring anisotropic 1992") == {"ward"}
     assert found("Nayar") == {"oren_nayar"}
     assert "coupled" in found("smits practitioners") and found("Photometria 1760") == {"lambert"}
     doc = extension.operators.BRDFC_OT_add_node.description(None, SimpleNamespace(model="ward"))
