@@ -65,7 +65,10 @@ def values_of(socket):
     if isinstance(held, int):
         return [held + 1]
     if isinstance(held, float):
-        return [value for value in NUMBERS if abs(value - held) > 0.1]
+        # Of a negative emission Blender 5.0 and 5.1 show nothing without Open Shading Language.
+        ignored = socket.name == "Emission Strength" and (5, 0) <= bpy.app.version < (5, 2)
+        least = 0 if ignored else -2
+        return [value for value in NUMBERS if abs(value - held) > 0.1 and value >= least]
     return {4: COLORS, 3: VECTORS}[len(held)]
 
 
