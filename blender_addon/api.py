@@ -457,7 +457,7 @@ def plan_conversion(materials, limit=convert.LIMIT):
     the fraction of the light that the replacement misplaces; or, where no model comes within
     `limit`, the reason for the refusal. If no model comes near at all, the error is infinite.
     Changes nothing."""
-    limit = argument_checks.fraction(limit)
+    limit = argument_checks.not_negative(limit)
     return [
         p.within(limit)
         for p in convert.plan(

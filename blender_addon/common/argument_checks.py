@@ -34,8 +34,8 @@ def number(given):
     return _of(Real, given, say("Expected a number, got {given!r}", given=given))
 
 
-def fraction(given):
-    """A number that is not negative; NaN is none."""
+def not_negative(given):
+    """A number from 0; NaN is none."""
     if not number(given) >= 0:
         raise ValueError(say("Expected a number from 0, got {given!r}", given=given))
     return given

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Input sockets of node groups: one for each parameter of the model, with range and tooltip."""
 
+import json
+
 import bpy
 
 from ..packs import pack
@@ -44,12 +46,22 @@ def has_menus():
     return bpy.app.version >= (5, 0, 0)
 
 
-def choice_socket_type():
+def _choice_socket_type():
     return "NodeSocketMenu" if has_menus() else "NodeSocketInt"
 
 
+def has_own_choices(group):
+    """Whether the sockets of a group's choices are those that this Blender makes."""
+    tag = group[pack.TAG]
+    made = tag.get("sockets", {})
+    found = {made[name] for name in json.loads(tag["choices"]) if name in made}
+    kind = _choice_socket_type()
+    items = (item for item in group.interface.items_tree if item.item_type == "SOCKET")
+    return all(item.socket_type == kind for item in items if item.identifier in found)
+
+
 def _choice_socket(group, parameter):
-    default, kind = parameter["choices"].index(parameter["default"]), choice_socket_type()
+    default, kind = parameter["choices"].index(parameter["default"]), _choice_socket_type()
     if has_menus():
         return _socket(group, parameter["label"], kind, tooltip(parameter))
     return _socket(

@@ -14,7 +14,7 @@ from bpy.app.handlers import persistent
 
 from ..common import app_handlers
 from ..common.i18n import of_error
-from ..content.group_sockets import has_menus
+from ..content.group_sockets import has_menus, has_own_choices
 from . import model_nodes, nodes
 
 #: Custom property of a group node: its choices by parameter.
@@ -35,7 +35,7 @@ def carry():
     those of another version of the extension."""
     for node in _group_nodes():
         group = node.node_tree
-        if group.library is not None or nodes.has_own_choices(group):
+        if group.library is not None or has_own_choices(group):
             continue
         if model_nodes.is_baked(node) or not model_nodes.is_current(group):
             continue
@@ -46,7 +46,8 @@ def carry():
         saved = node[_SAVED].to_dict() if _SAVED in node else {}
         known = {name: value for name, value in saved.items() if value in choices.get(name, ())}
         try:
-            nodes.remake(node, known)
+            form = "auto" if model_nodes.is_automatic(node) else model_nodes.identity(node).form
+            nodes.switch(node, form, known)
         except (ValueError, RuntimeError) as error:  # CompileError and PackError are RuntimeErrors
             print(f"brdfc: {of_error(error)[0]}")
             continue

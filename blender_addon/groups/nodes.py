@@ -15,7 +15,7 @@ from ..common import editable, enabling
 from ..common.i18n import say
 from ..content import group_content, part_groups, stand_in
 from ..content.group_content import ALBEDO, script_problem
-from ..content.group_sockets import choice_socket_type
+from ..content.group_sockets import has_own_choices
 from ..packs import device, pack
 from ..trees import animation
 from . import model_nodes
@@ -63,16 +63,6 @@ def find_group(form, albedo=False, with_osl=None, room=lamps.WHOLE):
 def is_sound(group):
     """Whether nothing that a group was made with is missing, and this Blender would make it."""
     return bool(group.nodes) and script_problem(group) is None and has_own_choices(group)
-
-
-def has_own_choices(group):
-    """Whether the sockets of a group's choices are those that this Blender makes."""
-    tag = group[TAG]
-    made = tag.get("sockets", {})
-    found = {made[name] for name in json.loads(tag["choices"]) if name in made}
-    kind = choice_socket_type()
-    items = (item for item in group.interface.items_tree if item.item_type == "SOCKET")
-    return all(item.socket_type == kind for item in items if item.identifier in found)
 
 
 def with_parts(groups):
@@ -392,34 +382,21 @@ def remove_unused_groups(kept=()):
         remove_group(group)
 
 
-def switch(node, representation):
-    """Changes a group node to another form of the same model; values and links stay.
+def switch(node, representation, known=None):
+    """Changes a group node to another form of the same model; values and links stay. `known`:
+    values of choices that its sockets do not tell.
 
     Raises ValueError, also if the file would not keep the change, and CompileError; the node is
     then as it was.
     """
     editable.check(node.id_data)
     model_name, _ = model_nodes.identity(node)
-    values = model_nodes.constants(node)
+    known = known or {}
+    values = model_nodes.constants(node) | known
     if representation != "auto":
         pack.model(model_name).resolve(representation, values)
     group = ensure_group(
         model_name, representation, albedo=model_nodes.uses_albedo(node), values=values
-    )
-    _exchange(node, group)
-
-
-def remake(node, known):
-    """Gives a node a group that this Blender makes anew, of the same form. `known`: values of
-    choices that its sockets do not tell. Raises ValueError and CompileError; the node is then as
-    it was."""
-    model_name, form = model_nodes.identity(node)
-    values = model_nodes.constants(node) | known
-    group = ensure_group(
-        model_name,
-        "auto" if model_nodes.is_automatic(node) else form,
-        albedo=model_nodes.uses_albedo(node),
-        values=values,
     )
     _exchange(node, group)
     for name, value in known.items():

@@ -3,7 +3,7 @@
 
 import bpy
 import pytest
-from helpers import add_camera, add_world, render
+from converting import flat
 
 VALUES = {"normalisation": "duer", "ax": 0.5, "ay": 0.5, "ks": (1.0, 1.0, 1.0)}
 
@@ -29,17 +29,7 @@ def choice(material):
 
 
 def mean(scene, material):
-    plane = bpy.data.objects.get("Plane")
-    if plane is None:
-        bpy.ops.mesh.primitive_plane_add(size=20, rotation=(1.2, 0, 0))
-        plane = bpy.context.object
-        add_camera(scene, orthographic=2)
-        add_world(scene)
-        scene.render.resolution_x = scene.render.resolution_y = 8
-        scene.cycles.samples = 256
-    plane.data.materials.clear()
-    plane.data.materials.append(material)
-    return render(scene)[..., 0].mean()
+    return flat(scene, material)[0][0]
 
 
 @pytest.mark.parametrize("form", ["auto", "nodes", "sampled"])
