@@ -41,6 +41,8 @@ _PARTS = [
     {"index": float(i), "side_across": 2.0 * (i % 2) - 1, "side_along": 2.0 * (i // 2) - 1}
     for i in range(slots.MOST_CONES)
 ]
+#: The outputs of the part "lit".
+_LIT = [["lit_place", "VECTOR"], ["lit_across", "FLOAT"], ["lit_along", "FLOAT"]]
 #: Larger than the angle between any two directions.
 _FAR = 4.0
 
@@ -106,7 +108,7 @@ def _inputs(parts):
 def _part_group(parts):
     """The group that makes the closure of a part of a lamp: a cone, which carries the model's value
     at a point of the part, or what random directions leave of it."""
-    inputs = _inputs(parts) + [[name, "FLOAT"] for name in _PARTS[0]]
+    inputs = _inputs(parts) + _LIT + [[name, "FLOAT"] for name in _PARTS[0]]
 
     def fill(w, found):
         here = parts.on(w, found)
@@ -134,8 +136,9 @@ def _lamp_group(parts, cones):
     part, inputs = _part_group(parts), _inputs(parts) + [["lit", "FLOAT"]]
 
     def fill(w, found):
-        closures = []
-        count = parts.on(w, found).add("count", layout=found["layout"])["count"]
+        here, closures = parts.on(w, found), []
+        count = here.add("count", layout=found["layout"])["count"]
+        found = found | here.add("lit", **found)
         for i, place in enumerate(_PARTS[:cones]):
             closure = add_group(w, part, found | place, f"part {i}")["BSDF"]
             if i > 0:
@@ -146,7 +149,7 @@ def _lamp_group(parts, cones):
             closures.append(closure)
         return {"BSDF": w.shown(found["lit"], w.sum(closures))}
 
-    content = ["lamp", cones, parts.data["count"], part[PART]]
+    content = ["lamp", cones, parts.data["count"], parts.data["lit"], part[PART]]
     return make_group(f"{parts.title}: lamp", content, inputs, [["BSDF", "SHADER"]], fill)
 
 

@@ -104,7 +104,7 @@ def _listed(survey, chosen, why=None):
     listed = [(c, slot, "") for slot, c in placed]
     listed += [(c, None, c.why or why) for c in survey.candidates if id(c) not in taken]
     return [
-        slots.Lamp(c.name, slot, c.rank, reason, c.sizeless, c.met, c.distorted, c.narrow)
+        slots.Lamp(c.name, slot, c.rank, reason, c.sizeless, c.met, c.distorted)
         for c, slot, reason in listed
     ]
 

@@ -14,10 +14,6 @@ from .kinds.mesh import FACED
 from .survey import Search, Survey
 
 #: Above this angular radius, uneven emission of a lamp matters: a lobe carries the mean of the
-#: An area lamp with a Spread below this angle lights the subject with a part of it, if the tangent
-#: of its angular radius exceeds this multiple of the Spread. Formula Nodes average over the whole
-#: lamp: under one of 2 m, at a Spread of 57 and 29 degrees, they are 1.3 and 5.6 % too dark.
-_NARROW, _LARGE_IN_SPREAD = 0.9, 0.35
 #: model over the lamp.
 _MAX_UNEVEN_SIZE = 0.05
 #: Ratio of radius to distance from which shaders leave a lamp to random rays (kNearest in
@@ -125,8 +121,6 @@ def _judge(survey):
         angle = float(np.mean(candidate.angular_size(survey.subject)))
         if not math.isfinite(candidate.rank + angle):  # a mesh with invalid coordinates
             candidate.rank = angle = 0.0
-        spread = candidate.spread
-        candidate.narrow = spread < _NARROW and angle > _LARGE_IN_SPREAD * spread
         candidate.width = round(math.log2(max(angle, 1e-4)))
         uneven, met = candidate.uneven, candidate.met
         if uneven and angle > _MAX_UNEVEN_SIZE and met and not candidate.why:

@@ -111,9 +111,8 @@ def elsewhere(library):
 class Lamp:
     """A lamp of a scene: its slot from 1, or None and the reason; its estimated irradiance at the
     subject, by which lamps are ranked; whether it has no size; whether random rays hit it, so that
-    it is visible even without a slot; whether its transform makes another shape of it than Cycles'
-    light sampling assumes; and whether the subject is lit by a part of it, as its Spread is
-    narrow."""
+    it is visible even without a slot; and whether its transform makes another shape of it than
+    Cycles' light sampling assumes."""
 
     name: str
     slot: int | None
@@ -122,7 +121,6 @@ class Lamp:
     sizeless: bool = False
     met: bool = True
     distorted: bool = False
-    narrow: bool = False
 
 
 @dataclass(frozen=True)
@@ -182,8 +180,6 @@ class Candidate:
     met: bool = True  # random rays hit it
     uneven: bool = False  # its emission is not uniform
     distorted: bool = False  # see Lamp
-    spread: float = math.pi  # the angle that it shines into
-    narrow: bool = False  # see Lamp
     sheet: Sheet | None = None  # of a flat lamp
     #: If they depend on the subject, judge(points) sets the values and `why`, given its points,
     #: (n, 3).

@@ -136,13 +136,6 @@ def hidden_from_rays(at):
     return _any([x for x in at.lamps if not (x.visible_diffuse and x.visible_glossy)])
 
 
-def narrow_spreads(at):
-    """Formula Nodes are under area lamps that light the subject with a part of them, as their
-    Spread is narrow. The model is averaged over the whole lamp."""
-    aims = at.aims and model_nodes.runs_anywhere(at.node)
-    return _any([x for x in at.found_lamps if x.narrow]) if aims else []
-
-
 def sheared_lamps(at):
     """Area lamps are sheared. In Cycles, random rays bring another amount of their light than light
     sampling does, so Formula Nodes and sampled forms differ from Blender's own nodes."""

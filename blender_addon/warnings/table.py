@@ -200,14 +200,6 @@ OF_NODE = (
         lamp_rules.hidden_from_rays,
     ),
     Row(
-        "narrow_spread",
-        WARNING,
-        "The Spread of area lamps ({lamps}) is narrow: their highlights on this material are too "
-        "dark, most at the edges; with Open Shading Language on they are right",
-        lamp_rules.narrow_spreads,
-        more="6 % at a Spread of 29 degrees, a third at the highlight's edge",
-    ),
-    Row(
         "sheared_lamps",
         WARNING,
         "Area lamps ({lamps}) are sheared by a parent or an instance that is scaled unevenly: "

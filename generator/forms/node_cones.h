@@ -6,6 +6,8 @@
 // give 0.
 #pragma once
 
+#include <cmath>
+
 #include "core/vec.h"
 
 namespace brdfc::forms {
@@ -34,6 +36,113 @@ template <class T> LampAxes<T> lamp_axes(const LampSlot<T>& slot) {
   axes.half_across = abs(slot.shape.y * slot.scale.x) / T(2);
   axes.half_along = abs(slot.shape.z * slot.scale.y) / T(2);
   return axes;
+}
+
+/// Where a direction meets the plane of a rectangle or an ellipse.
+template <class T> struct PlanePoint {
+  T slope;      ///< cosine between the direction and `away`: positive where the shining side is seen
+  T distance;   ///< from the shading point
+  Vec3<T> off;  ///< from the middle of the lamp
+};
+template <class T> PlanePoint<T> plane_point(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
+                                             const Vec3<T>& direction) {
+  const Vec3<T> centre = slot.place - at;
+  PlanePoint<T> out;
+  out.slope = dot(lamp.away, direction);
+  out.distance = dot(lamp.away, centre) / out.slope;
+  out.off = direction * out.distance - centre;
+  return out;
+}
+
+/// An area lamp with a Spread shines within a cone about its normal, as through a grid of slats (Cycles:
+/// kernel/light/area.h). A point of it shines in proportion to 1 - t / m: t is the tangent of the angle between the
+/// normal and the direction to the shading point, m that of half the Spread.
+template <class T> struct Spread {
+  decltype(T(0) > T(0)) is_narrow;  ///< whether the lamp has one that is less than half a turn
+  T widest;                         ///< m
+
+  T light(const T& cosine) const {
+    return select(is_narrow, maximum(T(1) - sqrt(T(1) - sqr(cosine)) / (cosine * widest), T(0)), T(1));
+  }
+};
+template <class T> Spread<T> spread_of(const LampSlot<T>& slot) {
+  // 0.5 minus the spread in turns: see brdfc_lamp() in osl/brdfc.osl.in.
+  const T lacking = slot.kind - select(T(3.5) < slot.kind, T(4), T(3));
+  return {T(2.5) < slot.kind && slot.kind < T(4.5) && T(1e-4) < lacking, cos(lacking * T(kPi)) / sin(lacking * T(kPi))};
+}
+
+/// The rectangle, or the ellipse, of a flat lamp with a Spread that bounds the part that shines on a shading point; for
+/// other lamps all of it.
+template <class T> struct LitArea {
+  Vec3<T> place;
+  T half_across, half_along;
+  T is_lit;  ///< 1, or 0 if no part shines there
+
+  LampSlot<T> of(LampSlot<T> slot) const {
+    slot.place = place;
+    return slot;
+  }
+  LampAxes<T> of(LampAxes<T> lamp) const {
+    lamp.half_across = half_across;
+    lamp.half_along = half_along;
+    return lamp;
+  }
+};
+/// The part that shines is where the lamp meets a disk in its plane, about the foot of the perpendicular from the
+/// shading point.
+template <class T> LitArea<T> lit_area(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at) {
+  constexpr double kThinnest = 1e-3;
+  const Spread<T> spread = spread_of(slot);
+  const Vec3<T> centre = slot.place - at;
+  const T x = -dot(centre, lamp.across), y = -dot(centre, lamp.along);
+  const T radius2 = sqr(maximum(dot(centre, lamp.away), T(0)) * spread.widest);
+  const T beside_x = maximum(abs(x) - lamp.half_across, T(0)), beside_y = maximum(abs(y) - lamp.half_along, T(0));
+  struct Range {
+    T middle, half;
+  };
+  const auto range = [&](const T& foot, const T& reach2, const T& half) {
+    const T reach = sqrt(maximum(reach2, T(0)));
+    const auto within = [&](const T& end) { return maximum(minimum(end, half), -half); };
+    const T low = within(foot - reach), high = within(foot + reach);
+    return Range{(low + high) / T(2), maximum((high - low) / T(2), half * T(kThinnest))};
+  };
+  const Range across = range(x, radius2 - sqr(beside_y), lamp.half_across);
+  const Range along = range(y, radius2 - sqr(beside_x), lamp.half_along);
+  const auto chosen = [&](const T& part, const T& whole) { return select(spread.is_narrow, part, whole); };
+  LitArea<T> out;
+  out.place =
+      select(spread.is_narrow, slot.place + lamp.across * across.middle + lamp.along * along.middle, slot.place);
+  out.half_across = chosen(across.half, lamp.half_across);
+  out.half_along = chosen(along.half, lamp.half_along);
+  out.is_lit = chosen(select(sqr(beside_x) + sqr(beside_y) < radius2, T(1), T(0)), T(1));
+  return out;
+}
+
+/// The light of a flat lamp that reaches a shading point from the direction wi, in units of the lamp's greatest: 0 from
+/// outside of an ellipse.
+template <class T>
+T light_from(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at, const Vec3<T>& wi) {
+  const Spread<T> spread = spread_of(slot);
+  const PlanePoint<T> p = plane_point(slot, lamp, at, wi);
+  const T from_middle2 =
+      sqr(dot(p.off, lamp.across) / lamp.half_across) + sqr(dot(p.off, lamp.along) / lamp.half_along);
+  const auto beside = spread.is_narrow && T(3.5) < slot.kind && T(1) < from_middle2;
+  return select(beside, T(0), spread.light(p.slope));
+}
+
+/// The mean of light_from() over a cone about `axis` within a lamp; chord is its radius. Measured over random cones up
+/// to 1.4 times as far from the normal as the light: 0.2 % too large on average, 1.8 % off in absolute terms, at most
+/// 9 %.
+template <class T> T mean_light(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& axis, const T& chord) {
+  // Six directions, a hexagon about the axis, of which each has its mirror image or another one at the same angle to
+  // the lamp's normal. Over a disk, the mean distance from the middle is 2/3 of the radius.
+  constexpr double kInner = 0.675;
+  const double half_root3 = std::sqrt(0.75);
+  const Spread<T> spread = spread_of(slot);
+  const T inner = chord * T(kInner), drop = sqr(inner) / T(2);
+  const T cosine = dot(axis, lamp.away), straight = cosine - cosine * drop;
+  const T aside = sqrt(T(1) - sqr(cosine)) * (inner * (sqrt(T(1) - drop / T(2)) * T(half_root3)));
+  return (spread.light(straight + aside) + spread.light(straight) + spread.light(straight - aside)) / T(3);
 }
 
 /// How the cones of a flat lamp are arranged: 1 to 4 of them in a row along the axis `across`, or -2 to -4 along the
@@ -305,22 +414,6 @@ template <class T> struct ConeAside {
   T clear;          ///< LampCone::clear
   T fits;           ///< 1 if the other lamp is small enough, otherwise 0
 };
-/// Where a direction meets the plane of a rectangle or an ellipse.
-template <class T> struct PlanePoint {
-  T slope;      ///< cosine between the direction and `away`: positive where the shining side is seen
-  T distance;   ///< from the shading point
-  Vec3<T> off;  ///< from the middle of the lamp
-};
-template <class T> PlanePoint<T> plane_point(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
-                                             const Vec3<T>& direction) {
-  const Vec3<T> centre = slot.place - at;
-  PlanePoint<T> out;
-  out.slope = dot(lamp.away, direction);
-  out.distance = dot(lamp.away, centre) / out.slope;
-  out.off = direction * out.distance - centre;
-  return out;
-}
-
 /// The part of a small disk of directions about `other` that lies within a rectangle or an ellipse.
 template <class T> T part_within(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at,
                                  const Vec3<T>& other, const T& other_radius) {

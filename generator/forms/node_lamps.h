@@ -121,10 +121,12 @@ template <class T> struct ToonLobe {
 };
 /// `of_part`: the radius of a cone within a flat lamp. `bounds`: FlatPoint::bounds. `index`: of the cone. `pick`: a
 /// random number in [0, 1), which picks the part whose value a small lamp has. `room`: the radius that a cone may have
-/// without covering another lamp. `emphasis`, `density`: at the point where the value is taken.
+/// without covering another lamp. `emphasis`, `density`: at the point where the value is taken. `share`: the light of
+/// that point divided by the mean over the cone.
 template <class T> ToonLobe<T> toon_lobe(const Vec3<T>& shape, const LampCone<T>& cone, const T& of_part,
                                          const T& bounds, const T& index, const T& pick, const T& emphasis,
-                                         const T& density, const T& room, const Rgb<T>& value, const T& u) {
+                                         const T& share, const T& density, const T& room, const Rgb<T>& value,
+                                         const T& u) {
   constexpr double kWidened = 2e-4;
   const T part = part_of_lamp(met_angle(shape, cone), emphasis, density) / cone.clear;
   const T brightest = max_component(value) * part;
@@ -135,7 +137,7 @@ template <class T> ToonLobe<T> toon_lobe(const Vec3<T>& shape, const LampCone<T>
       flat && brightest * emphasis * within2 * T(kPi) < T(kLeastKept) && brightest * sqr(bounds) * T(kPi) < T(kWidened);
   const T picked = pick * count_of(cone.cones.layout) - index;
   const auto is_picked = T(0) <= picked && picked < T(1);
-  const T factor = select(is_whole, select(is_picked, part, T(0)), emphasis * part);
+  const T factor = select(is_whole, select(is_picked, part, T(0)), emphasis * part * share);
   const T largest = max_component(value) * factor;
   const T wide = minimum(sqrt(T(kWidened / kPi) / largest), room);
   // Another cone within its lamp has a fixed size.

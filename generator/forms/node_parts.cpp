@@ -36,6 +36,11 @@ LampAxes<Expr> axes_input() {
   return {input3("across"), input3("along"), input3("away"), Expr::input("half_across"), Expr::input("half_along")};
 }
 
+LitArea<Expr> lit_input() {
+  return {input3("lit_place"), Expr::input("lit_across"), Expr::input("lit_along"), Expr(1.0)};
+}
+LitArea<Expr> lit_here() { return lit_area(slot_input(), axes_input(), input3("at")); }
+
 LampPart<Expr> part_input() { return {Expr::input("index"), Expr::input("side_across"), Expr::input("side_along")}; }
 void take_part(LampCone<Expr>& cone) {
   cone.part_across = Expr::input("part_across");
@@ -45,9 +50,9 @@ void take_part(LampCone<Expr>& cone) {
 }  // namespace
 
 const std::set<std::string>& node_vectors() {
-  static const std::set<std::string> names = {"across",  "aim",   "along", "at",   "away",  "axis",
-                                              "normal",  "other", "place", "ray",  "scale", "shape",
-                                              "towards", "true",  "turn",  "view", "wi",    "wo"};
+  static const std::set<std::string> names = {"across", "aim",   "along", "at",  "away",  "axis",  "lit_place",
+                                              "normal", "other", "place", "ray", "scale", "shape", "towards",
+                                              "true",   "turn",  "view",  "wi",  "wo"};
   return names;
 }
 
@@ -86,7 +91,9 @@ NodeProgram record_axes() {
 }
 NodeProgram record_cone() {
   return recorded([](Program& p) {
-    const LampCone<Expr> cone = cone_of(slot_input(), axes_input(), input3("at"), input3("view"), input3("true"));
+    const LitArea<Expr> lit = lit_here();
+    const LampCone<Expr> cone =
+        cone_of(lit.of(slot_input()), lit.of(axes_input()), input3("at"), input3("view"), input3("true"));
     p.output("towards", cone.towards);
     p.output("aim", cone.aim);
     p.output("part_across", cone.part_across);
@@ -98,11 +105,19 @@ NodeProgram record_cone() {
     p.output("inner", cone.inner);
     p.output("flat", cone.flat);
     p.output("used", cone.used);
-    p.output("active", cone.active);
+    p.output("active", cone.active * lit.is_lit);
     p.output("above", cone.above);
     p.output("layout", cone.cones.layout);
     p.output("clear", cone.clear);
     p.output("moved", cone.cones.moved);
+  });
+}
+NodeProgram record_lit() {
+  return recorded([](Program& p) {
+    const LitArea<Expr> lit = lit_here();
+    p.output("lit_place", lit.place);
+    p.output("lit_across", lit.half_across);
+    p.output("lit_along", lit.half_along);
   });
 }
 NodeProgram record_count() {
@@ -116,15 +131,19 @@ NodeProgram record_cone_at() {
     cone.cones.moved = Expr::input("moved");
     take_part(cone);
     cone.of_cones = Expr::input("of_cones");
-    const ConeOfPart<Expr> found = cone_at(slot_input(), axes_input(), cone, part_input());
+    const LitArea<Expr> lit = lit_input();
+    const ConeOfPart<Expr> found = cone_at(lit.of(slot_input()), lit.of(axes_input()), cone, part_input());
+    p.output("mean", mean_light(slot_input(), axes_input(), found.axis, found.chord));
     p.output("axis", found.axis);
     p.output("of_part", found.chord);
   });
 }
 NodeProgram record_aside() {
   return recorded([](Program& p) {
-    const ConeAside<Expr> aside = cone_aside(slot_input(), axes_input(), input3("at"), input3("towards"),
-                                             Expr::input("inner"), input3("other"), Expr::input("other_radius"));
+    const LitArea<Expr> lit = lit_here();
+    const ConeAside<Expr> aside =
+        cone_aside(lit.of(slot_input()), lit.of(axes_input()), input3("at"), input3("towards"), Expr::input("inner"),
+                   input3("other"), Expr::input("other_radius"));
     p.output("axis", aside.towards);
     p.output("of_cones", aside.of_cones);
     p.output("clear", aside.clear);
@@ -137,8 +156,10 @@ NodeProgram record_flat() {
     cone.of_cones = Expr::input("of_cones");
     take_part(cone);
     cone.cones.layout = Expr::input("layout");
-    const FlatPoint<Expr> point = flat_point(slot_input(), axes_input(), input3("at"), cone, part_input(),
-                                             Expr::input("u_0"), Expr::input("u_1"));
+    const LitArea<Expr> lit = lit_input();
+    const FlatPoint<Expr> point = flat_point(lit.of(slot_input()), lit.of(axes_input()), input3("at"), cone,
+                                             part_input(), Expr::input("u_0"), Expr::input("u_1"));
+    p.output("light", light_from(slot_input(), axes_input(), input3("at"), point.wi));
     p.output("wi", point.wi);
     p.output("emphasis", point.emphasis);
     p.output("bounds", point.bounds);
@@ -152,7 +173,9 @@ NodeProgram record_met() {
     cone.of_cones = Expr::input("of_cones");
     cone.drop = Expr::input("drop");
     take_part(cone);
-    p.output("met", met_part(slot_input(), axes_input(), input3("at"), cone, input3("ray"), Expr::input("density")));
+    const LitArea<Expr> lit = lit_here();
+    p.output("met", met_part(lit.of(slot_input()), lit.of(axes_input()), input3("at"), cone, input3("ray"),
+                             Expr::input("density")));
   });
 }
 NodeProgram record_lobe() {
@@ -165,9 +188,10 @@ NodeProgram record_lobe() {
     cone.cones.layout = Expr::input("layout");
     cone.drop = Expr::input("drop");
     const Expr emphasis = select(cone.flat > Expr(0.5), Expr::input("emphasis"), times_cone(cone, cone.of_cones));
-    const ToonLobe<Expr> lobe = toon_lobe(input3("shape"), cone, Expr::input("of_part"), Expr::input("bounds"),
-                                          Expr::input("index"), Expr::input("pick"), emphasis, Expr::input("density"),
-                                          Expr::input("room"), Rgb<Expr>::input("value"), Expr::input("u_2"));
+    const Expr share = select(cone.flat > Expr(0.5), Expr::input("light") / Expr::input("mean"), Expr(1.0));
+    const ToonLobe<Expr> lobe = toon_lobe(
+        input3("shape"), cone, Expr::input("of_part"), Expr::input("bounds"), Expr::input("index"), Expr::input("pick"),
+        emphasis, share, Expr::input("density"), Expr::input("room"), Rgb<Expr>::input("value"), Expr::input("u_2"));
     p.output("color", lobe.color);
     p.output("size", lobe.size);
     p.output("whole", lobe.whole);

@@ -18,6 +18,8 @@ print::NodeProgram record_bend();
 print::NodeProgram record_raise();
 print::NodeProgram record_axes();
 print::NodeProgram record_cone();
+/// The part of a flat lamp that shines on the shading point.
+print::NodeProgram record_lit();
 /// The cone of a lamp with this index.
 print::NodeProgram record_count();
 print::NodeProgram record_cone_at();

@@ -366,6 +366,7 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
   if (lamps) {
     add("axes", record_axes());
     add("cone", record_cone());
+    add("lit", record_lit());
     add("count", record_count());
     add("cone_at", record_cone_at());
     add("aside", record_aside());

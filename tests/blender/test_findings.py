@@ -402,23 +402,6 @@ def test_what_is_wrong_with_several_nodes_is_said_once(extension, empty):
             assert message.startswith(f"{names}: ") and message.count("clamped") == 1
 
 
-def test_area_lamps_that_light_with_a_part_of_them(extension, empty):
-    """A wide one, one with a narrow Spread, a small one, and materials that are right there."""
-    empty.cycles.shading_system = False
-    material = extension.api.new_material("ward")
-    helpers.add_sphere(empty, material)
-    lamp = helpers.add_lamp(empty, "AREA", "Lamp", (0, -2, 5), (0.4, 0, 0))
-    for size, spread, expected in ((2, math.pi, False), (2, 0.5, True), (0.2, 0.5, False)):
-        lamp.data.size, lamp.data.spread = size, spread
-        bpy.context.view_layer.update()
-        assert ("narrow_spread" in found(extension, material, empty)) == expected
-    lamp.data.size = 2
-    bpy.context.view_layer.update()
-    for model, form in (("ward", "sampled"), ("ward", "aimed"), ("microfacet", "nodes")):
-        other = extension.api.new_material(model, form)
-        assert "narrow_spread" not in found(extension, other, empty)
-
-
 def test_sheared_area_lamps(extension, empty):
     material = extension.api.new_material("ward", "nodes")
     helpers.add_sphere(empty, material)

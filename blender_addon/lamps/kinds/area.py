@@ -65,9 +65,6 @@ class Area(Light):
     def is_moderate(self, light):
         return light.normalize and light.energy <= _MODERATE * self.extent(light)
 
-    def spread(self, light):
-        return light.spread
-
     def is_distorted(self, matrix):
         return slots.is_sheared(matrix)
 

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What Blender's types of lights have in common."""
 
-import math
 from abc import ABC, abstractmethod
 from functools import partial
 
@@ -98,10 +97,6 @@ class Light(Kind, ABC):
         one closure, with f towards one random point of the light."""
         return False
 
-    def spread(self, light):
-        """The angle that each point of it shines into, where that is less than half a turn."""
-        return math.pi
-
     def is_distorted(self, matrix):
         """Whether a transform makes another shape of it than Cycles' light sampling assumes."""
         return False
@@ -170,7 +165,6 @@ class Light(Kind, ABC):
             met=has_importance(light) and not sizeless,
             uneven=not self.is_even(light, matrix),
             distorted=self.is_distorted(matrix),
-            spread=self.spread(light),
             sheet=self.sheet(item, light, matrix),
         )
 
