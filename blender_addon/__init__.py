@@ -8,6 +8,7 @@ import bpy
 
 from . import lamps, operators
 from .common import enabling, i18n
+from .gltf import glTF2ExportUserExtension as glTF2ExportUserExtension
 from .groups import automatic, choice_sockets, imports, update
 from .panels import plot_panel, ui
 from .warnings import closure_slots, console

@@ -33,6 +33,7 @@ from .measured import Measured, MeasuredError
 from .packs import kernel, pack
 from .packs.pack import PackError
 from .packs.parameter_values import equal_in_float32
+from .plotting import nearest_node
 from .trees import animation, shader_trees
 from .warnings import checks
 from .warnings.rows import Finding
@@ -63,6 +64,7 @@ __all__ = [
     "make_local",
     "measured_fits",
     "models",
+    "nearest_principled",
     "new_layers",
     "new_material",
     "new_measured_library",
@@ -493,6 +495,27 @@ def convert_back(material):
 
     Returns the number of nodes restored. Raises ValueError where there is neither."""
     return convert.restore(argument_checks.material(material))
+
+
+def nearest_principled(material, node=None):
+    """The inputs of the Principled node that comes nearest to a material with one model, or to the
+    one that `node` names: base_color, metallic, roughness, ior and transmission, and the fraction
+    of the light from 45 degrees that the node misplaces, error. None for a black material. Linked
+    parameters have their default.
+
+    For exporters that know no other node; that to glTF uses it by itself.
+    """
+    near = nearest_node.of_node(_the_node(material, node))
+    if near is None:
+        return None
+    return {
+        "base_color": near.color,
+        "metallic": near.metallic,
+        "roughness": near.roughness,
+        "ior": near.ior,
+        "transmission": float(near.transmission),
+        "error": near.error,
+    }
 
 
 def add_albedo(material, node=None):

@@ -12,20 +12,13 @@ from ..common import color
 from ..common.i18n import form_name, in_percent, of_error, say
 from ..groups import model_nodes
 from ..packs import pack
+from ..plotting import nearest_node
 from .labels import wrapped
 
 #: Number of cached pictures; the oldest is discarded.
 _KEPT = 16
 _previews = None
 _places = {}  # values and form: name of the preview, legend
-
-
-def _values(node):
-    """A node's values by name, and the names of linked parameters."""
-    model_name, _ = model_nodes.identity(node)
-    model = pack.model(model_name)
-    values = model.fixed | {name: model_nodes.get_value(node, name) for name in model.parameters}
-    return values, [name for name, value in values.items() if value is None]
 
 
 def drawn(node):
@@ -35,7 +28,7 @@ def drawn(node):
     from ..plotting import form_light, plots, shader_text
 
     model_name, _ = model_nodes.identity(node)
-    values, _ = _values(node)
+    values, _ = nearest_node.values(node)
     form = functools.partial(form_light.lobes, node) if model_nodes.is_fitted(node) else None
     try:
         return plots.draw(model_name, values, form)
@@ -47,7 +40,7 @@ def picture(node):
     """The preview for a node's values and its plots.Legend; drawn if the values are new. Raises
     ValueError for a model that the extension lacks."""
     model_name, form = model_nodes.identity(node)
-    values, _ = _values(node)
+    values, _ = nearest_node.values(node)
     key = (
         model_name,
         form,
@@ -144,7 +137,7 @@ def draw_plots(layout, material):
             wrapped(column, said)
         wrapped(column, say("Middle: under a lamp, by the strokes below"))
         wrapped(column, say("Below: albedo, views from 0° to 90°"))
-        _, linked = _values(node)
+        _, linked = nearest_node.values(node)
         if linked:
             labels = pack.model(model_nodes.identity(node).model).parameters
             names = ", ".join(labels[name]["label"] for name in linked)

@@ -434,8 +434,9 @@ def _of_node(near):
     return near.curve, native_bsdf.albedo(native, wo, terms), ball
 
 
-def light(model, values, form=None):
-    """The Light of a model at values_in_range(), and of `form` as in draw()."""
+def _with_nearest(model, values):
+    """f cos of a model and its albedos, as in Light; its Shares for all views and for light from
+    INCIDENCE; and the nearest Principled node."""
     wo, here = _directions(), _slice(np.radians(-INCIDENCE))
     curve, albedo = slice_of(model, values, _angles()), albedo_curve(model, values)
     mirror, refracted = model.mirror(wo, **values), model.transmit(wo, **values)
@@ -443,6 +444,18 @@ def light(model, values, form=None):
     scattered = np.array([np.interp(INCIDENCE, _degrees(), c) for c in shares.scattered.T])
     here = Shares(model.mirror(here, **values), scattered, model.transmit(here, **values))
     near = nearest(curve, _angles(), INCIDENCE, _views(), shares, here)
+    return curve, albedo, shares, here, near
+
+
+def nearest_to(model_name, values):
+    """The Principled node Nearest to a model with a node's values; None if it reflects nothing."""
+    model = brdfc.model(model_name)
+    return _with_nearest(model, values_in_range(model, values))[-1]
+
+
+def light(model, values, form=None):
+    """The Light of a model at values_in_range(), and of `form` as in draw()."""
+    curve, albedo, shares, here, near = _with_nearest(model, values)
     _, wi, viewers, _ = _ball()
     f_cos, lit = np.zeros_like(wi), wi[:, 2] > 0
     f_cos[lit] = model.eval(wi[lit], viewers[lit], **values) * wi[lit, 2:]

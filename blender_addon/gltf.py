@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Export to glTF, which has one material, metallic and rough, and no models like these. Blender's
+exporter asks enabled extensions about each material; a model is exported as the nearest Principled
+node, which the exporter would write in the same way."""
+
+from .groups import model_nodes
+from .packs.pack import PackError
+from .plotting import nearest_node
+
+
+class glTF2ExportUserExtension:  # the exporter looks for this name
+    """The exporter makes one for each file, and logs what its methods raise."""
+
+    def gather_material_hook(self, gltf2_material, blender_material, export_settings):
+        """Fills in what the exporter has found no Principled node for."""
+        ours = model_nodes.shown_nodes(blender_material) if blender_material else []
+        if len(ours) != 1:
+            return
+        try:
+            near = nearest_node.of_node(ours[0])
+        except (ValueError, PackError):  # of another version, without this model
+            return
+        if near is not None:
+            _fill(gltf2_material, near)
+
+
+def _fill(gltf2_material, near):
+    # The exporter's classes, which exist while it runs.
+    from io_scene_gltf2.io.com.gltf2_io import MaterialPBRMetallicRoughness
+    from io_scene_gltf2.io.com.gltf2_io_extensions import Extension
+
+    gltf2_material.pbr_metallic_roughness = MaterialPBRMetallicRoughness(
+        base_color_factor=[*near.color, 1.0],
+        base_color_texture=None,
+        extensions=None,
+        extras=None,
+        metallic_factor=near.metallic,
+        metallic_roughness_texture=None,
+        roughness_factor=near.roughness,
+    )
+    extensions = dict(gltf2_material.extensions or {})
+    if near.metallic < 1:
+        extensions["KHR_materials_ior"] = {"ior": near.ior}
+        # The exporter drops an IOR that is alone.
+        extensions["KHR_materials_specular"] = {"specularFactor": 1.0}
+    if near.transmission:
+        extensions["KHR_materials_transmission"] = {"transmissionFactor": 1.0}
+    gltf2_material.extensions = {
+        name: Extension(name, value, required=False) if isinstance(value, dict) else value
+        for name, value in extensions.items()
+    }
