@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Export to glTF, which has one material, metallic and rough, and no models like these. Blender's
-exporter asks enabled extensions about each material; a model is exported as the nearest Principled
-node, which the exporter would write in the same way."""
+"""Export to glTF, which gets the nearest Principled material.
+
+Files of glTF can't hold reflection models. Blender's exporter asks enabled extensions about each
+material."""
 
 from .groups import model_nodes
 from .packs.pack import PackError

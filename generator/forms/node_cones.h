@@ -66,9 +66,11 @@ template <class T> struct Spread {
   }
 };
 template <class T> Spread<T> spread_of(const LampSlot<T>& slot) {
-  // 0.5 minus the spread in turns: see brdfc_lamp() in osl/brdfc.osl.in.
-  const T lacking = slot.kind - select(T(3.5) < slot.kind, T(4), T(3));
-  return {T(2.5) < slot.kind && slot.kind < T(4.5) && T(1e-4) < lacking, cos(lacking * T(kPi)) / sin(lacking * T(kPi))};
+  // A lamp with a Spread of 0 shines, too. Only the ratio of its light at two points matters here.
+  constexpr double kLeast = 0.02;
+  // 0.499 minus 0.998 times the spread in turns: see brdfc_lamp() in osl/brdfc.osl.in.
+  const T lacking = slot.kind - select(T(3.5) < slot.kind, T(4), T(3)), angle = lacking * T(kPi / 0.998);
+  return {T(2.5) < slot.kind && slot.kind < T(4.5) && T(1e-4) < lacking, maximum(cos(angle) / sin(angle), T(kLeast))};
 }
 
 /// The rectangle, or the ellipse, of a flat lamp with a Spread that bounds the part that shines on a shading point; for

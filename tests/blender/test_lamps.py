@@ -153,7 +153,8 @@ def expected(item):
         "SPOT": lambda: (1 + 0.45 * light.spot_blend, light.shadow_soft_size, light.spot_size),
         "SUN": lambda: (2, light.angle, 0),
         "AREA": lambda: (
-            (3.5 if light.shape in {"SQUARE", "RECTANGLE"} else 4.5) - light.spread / (2 * math.pi),
+            (3 if light.shape in {"SQUARE", "RECTANGLE"} else 4)
+            + 0.499 * (1 - light.spread / math.pi),
             light.size,
             light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size,
         ),

@@ -450,9 +450,19 @@ def narrow_ellipse(scene):
     )  # fmt: skip
 
 
+def parallel_disk(scene):
+    """Its number in the slot is the nearest to that of the next shape."""
+    add_lamp(
+        scene, "AREA", "Area", (2, -3, 2), (0.96, 0, 0.6), energy=300, shape="DISK", size=1.0,
+        spread=0.0,
+    )  # fmt: skip
+
+
 @pytest.mark.long
 @pytest.mark.sample(1)
-@pytest.mark.parametrize("light", [narrow_square, narrow_ellipse], ids=lambda f: f.__name__)
+@pytest.mark.parametrize(
+    "light", [narrow_square, narrow_ellipse, parallel_disk], ids=lambda f: f.__name__
+)
 @pytest.mark.parametrize(
     ("model", "values", "form"),
     [("modified_phong", {"e": 20.0}, "exact"), ("ward", {"ax": 0.3, "ay": 0.3}, "aimed")],

@@ -32,9 +32,10 @@ class Area(Light):
         shape = slots.ELLIPSE if _is_round(light) else slots.RECTANGLE
         first, second = self.sizes(light)
         sizes = slots.Driven(light, first, sign), slots.Driven(light, second)
-        # The shader finds what the spread lacks of half a turn, in turns, in what the number of the
-        # shape is above a whole one.
-        spread = slots.Driven(light, "spread", -0.5 / math.pi, shape + 0.5)
+        # What the number of the shape is above a whole one: nothing for a spread of half a turn,
+        # and for a spread of 0 less than would round to the next shape.
+        most = 0.499
+        spread = slots.Driven(light, "spread", -most / math.pi, shape + most)
         return slots.numbers(spread, *placed, sizes)
 
     def sheet(self, item, light, matrix):
