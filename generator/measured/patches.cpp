@@ -13,8 +13,8 @@ namespace {
 
 /// Changes of the values at the centres. More of them hardly make interpolated lobes better, and noise larger.
 constexpr int kRounds = 4;
-/// Places along theta and phi at which a patch's mean is taken.
-constexpr int kPlaces = 16;
+/// Places at which a patch's mean is taken: along theta on each side of the centre, and along phi.
+constexpr int kThetas = 8, kPhis = 32;
 
 using Values = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Means = Eigen::SparseMatrix<double, Eigen::RowMajor>;
@@ -26,16 +26,19 @@ Means means_of(const Patches& patches) {
   for (const Patches::Ring& ring : patches.rings()) {
     // Places of equal projected solid angle, which is proportional to sin^2 theta.
     const auto sin2 = [](double degrees) { return std::pow(std::sin(degrees / kDegrees), 2); };
-    const double first = sin2(ring.from), all = sin2(ring.to) - first;
+    const double middle = (ring.from + ring.to) / 2, all = sin2(ring.to) - sin2(ring.from);
     for (std::size_t k = 0; k < ring.number; ++k, ++patch)
-      for (int t = 0; t < kPlaces; ++t)
-        for (int p = 0; p < kPlaces; ++p) {
-          const double theta = kDegrees * std::asin(std::sqrt(first + all * (t + 0.5) / kPlaces)),
-                       phi = 360 * (double(k) - 0.5 + (p + 0.5) / kPlaces) / double(ring.number);
-          const Patches::Around around = patches.around(theta, phi);
-          for (std::size_t i = 0; i < 4; ++i)
-            entries.emplace_back(int(patch), int(around.patch[i]), around.weight[i] / (kPlaces * kPlaces));
-        }
+      for (const auto& [from, to] : {std::pair(ring.from, middle), std::pair(middle, ring.to)}) {
+        const double first = sin2(from), part = sin2(to) - first;
+        for (int t = 0; t < kThetas; ++t)
+          for (int p = 0; p < kPhis; ++p) {
+            const double theta = kDegrees * std::asin(std::sqrt(first + part * (t + 0.5) / kThetas)),
+                         phi = 360 * (double(k) - 0.5 + (p + 0.5) / kPhis) / double(ring.number);
+            const Patches::Around around = patches.around(theta, phi);
+            for (std::size_t i = 0; i < 4; ++i)
+              entries.emplace_back(int(patch), int(around.patch[i]), around.weight[i] * part / (all * kThetas * kPhis));
+          }
+      }
   }
   Means out(Eigen::Index(patches.size()), Eigen::Index(patches.size()));
   out.setFromTriplets(entries.begin(), entries.end());  // which adds entries of one place

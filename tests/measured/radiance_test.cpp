@@ -59,7 +59,7 @@ TEST(Patches, ABorderBelongsToThePatchAfterIt) {
   EXPECT_EQ(full.patch(90, 359.9), 133u);
 }
 
-/// Two rings, so that a test can look at every pair of patches closely.
+/// Three rings, so that a test can look at every pair of patches closely.
 Patches few() { return Patches("few", {{0, 30, 1}, {30, 60, 4}, {60, 90, 3}}); }
 
 std::vector<std::array<float, 3>> random_means(std::size_t size) {
@@ -75,27 +75,35 @@ TEST(PatchMatrix, PatchesKeepTheirMeans) {
   const Patches patches = few();
   const auto means = random_means(patches.size());
   const PatchMatrix matrix(patches, means);
-  // Places of equal projected solid angle in each patch.
-  constexpr int kPlaces = 10;
-  std::vector<std::vector<Middle>> places;
+  // Places in each patch with their weights, the projected solid angle.
+  // With 12 azimuths no kink of the interpolation is between two places.
+  constexpr int kThetas = 16, kPhis = 12;
+  struct Place {
+    Middle at;
+    double weight;
+  };
+  std::vector<std::vector<Place>> places;
   for (const Patches::Ring& ring : patches.rings())
     for (std::size_t k = 0; k < ring.number; ++k) {
       places.emplace_back();
-      const double from = std::pow(std::sin(ring.from * kPi / 180), 2), to = std::pow(std::sin(ring.to * kPi / 180), 2);
-      for (int t = 0; t < kPlaces; ++t)
-        for (int p = 0; p < kPlaces; ++p)
-          places.back().push_back({180 / kPi * std::asin(std::sqrt(from + (to - from) * (t + 0.5) / kPlaces)),
-                                   360 * (double(k) - 0.5 + (p + 0.5) / kPlaces) / double(ring.number)});
+      double all = 0;
+      for (int t = 0; t < kThetas; ++t) {
+        const double theta = ring.from + (ring.to - ring.from) * (t + 0.5) / kThetas,
+                     weight = std::sin(2 * theta * kPi / 180);
+        for (int p = 0; p < kPhis; ++p) {
+          const double phi = 360 * (double(k) - 0.5 + (p + 0.5) / kPhis) / double(ring.number);
+          places.back().push_back({{theta, phi}, weight});
+          all += weight;
+        }
+      }
+      for (Place& place : places.back()) place.weight /= all;
     }
   for (std::size_t i = 0; i < patches.size(); ++i)
     for (std::size_t o = 0; o < patches.size(); ++o) {
       Rgb<double> sum(0);
-      for (const Middle& a : places[i])
-        for (std::size_t k = 0; k < places[o].size(); k += 1) {
-          const Middle& b = places[o][k];
-          sum += matrix.eval(a.theta, a.phi, b.theta, b.phi);
-        }
-      sum = sum / double(places[i].size() * places[o].size());
+      for (const auto& [a, weight_a] : places[i])
+        for (const auto& [b, weight_b] : places[o])
+          sum += matrix.eval(a.theta, a.phi, b.theta, b.phi) * (weight_a * weight_b);
       const auto& expected = means[i * patches.size() + o];
       EXPECT_NEAR(sum.r, double(expected[0]), 2e-3) << i << " " << o;
       EXPECT_NEAR(sum.g, double(expected[1]), 2e-3) << i << " " << o;
