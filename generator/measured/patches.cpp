@@ -13,6 +13,9 @@ namespace {
 
 /// Changes of the values at the centres. More of them hardly make interpolated lobes better, and noise larger.
 constexpr int kRounds = 4;
+/// How many times as bright as its mean the middle of a pair of patches may be: from the first number on the mean
+/// replaces a part of the interpolation, from the second on all of it.
+constexpr double kPeak = 1.5, kHighestPeak = 2.5;
 /// Places at which a patch's mean is taken: along theta on each side of the centre, and along phi.
 constexpr int kThetas = 8, kPhis = 32;
 
@@ -114,7 +117,7 @@ double Patches::widest() const {
 }
 
 PatchMatrix::PatchMatrix(Patches patches, std::vector<std::array<float, 3>> means)
-    : patches_(std::move(patches)), centres_(means), scale_(means.size()) {
+    : patches_(std::move(patches)), centres_(means), scale_(means.size()), constant_(means.size()) {
   const Eigen::Index size = Eigen::Index(patches_.size());
   const Means mean = means_of(patches_);
   for (std::size_t c = 0; c < 3; ++c) {
@@ -123,7 +126,7 @@ PatchMatrix::PatchMatrix(Patches patches, std::vector<std::array<float, 3>> mean
     const bool same = c > 0 && std::ranges::all_of(means, [&](const auto& v) { return v[c] == v[c - 1]; });
     if (same) {  // grey
       for (std::size_t i = 0; i < means.size(); ++i)
-        centres_[i][c] = centres_[i][c - 1], scale_[i][c] = scale_[i][c - 1];
+        for (auto* of : {&centres_, &scale_, &constant_}) (*of)[i][c] = (*of)[i][c - 1];
       continue;
     }
     Values at = given, scale;
@@ -133,8 +136,14 @@ PatchMatrix::PatchMatrix(Patches patches, std::vector<std::array<float, 3>> mean
       scale = (given.array() > 0).select(given.array() / reached.array(), 0.);
       if (round < kRounds) at.array() *= scale.array();
     }
-    for (std::size_t i = 0; i < means.size(); ++i)
-      centres_[i][c] = float(at.data()[i]), scale_[i][c] = float(scale.data()[i]);
+    for (std::size_t i = 0; i < means.size(); ++i) {
+      const double of_pair = given.data()[i], centre = at.data()[i], to_mean = scale.data()[i];
+      const double peak = of_pair > 0 ? centre * to_mean / of_pair : 0,
+                   flat = std::clamp((peak - kPeak) / (kHighestPeak - kPeak), 0., 1.);
+      centres_[i][c] = float(centre);
+      scale_[i][c] = float(to_mean * (1 - flat));
+      constant_[i][c] = float(of_pair * flat);
+    }
   }
 }
 
@@ -148,8 +157,9 @@ Rgb<double> PatchMatrix::eval(double theta_i, double phi_i, double theta_o, doub
       const auto& value = centres_[in.patch[i] * size + out.patch[o]];
       for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * double(value[c]);
     }
-  const auto& scale = scale_[patches_.patch(theta_i, phi_i) * size + patches_.patch(theta_o, phi_o)];
-  return Rgb<double>(sum[0] * double(scale[0]), sum[1] * double(scale[1]), sum[2] * double(scale[2]));
+  const std::size_t pair = patches_.patch(theta_i, phi_i) * size + patches_.patch(theta_o, phi_o);
+  for (std::size_t c = 0; c < 3; ++c) sum[c] = sum[c] * double(scale_[pair][c]) + double(constant_[pair][c]);
+  return Rgb<double>(sum[0], sum[1], sum[2]);
 }
 
 }  // namespace brdfc::measured

@@ -59,6 +59,10 @@ class Patches {
 /// Linear interpolation between the centres would make highlights weaker and their surroundings brighter. Therefore the
 /// values at the centres are changed until their interpolation has nearly the means of the file, and each pair of
 /// patches is scaled to have them exactly.
+///
+/// What a mirror reflects is in one patch alone. Interpolated it would be brighter in the middle of an incident patch
+/// than at its edge, and some views brighter than the light. So the mean itself takes the place of the interpolation
+/// where that would be about twice as bright in the middle.
 class PatchMatrix {
  public:
   /// `means` of incident patch i and outgoing patch o are at [i * size + o].
@@ -68,7 +72,7 @@ class PatchMatrix {
 
  private:
   Patches patches_;
-  std::vector<std::array<float, 3>> centres_, scale_;
+  std::vector<std::array<float, 3>> centres_, scale_, constant_;
 };
 
 }  // namespace brdfc::measured

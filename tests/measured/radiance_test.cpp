@@ -124,6 +124,27 @@ TEST(PatchMatrix, AConstantIsOne) {
   }
 }
 
+TEST(PatchMatrix, AMirrorReflectsTheSameFromAllViewsOfAPatch) {
+  const Patches& patches = Patches::known()[0];
+  const std::size_t size = patches.size();
+  std::vector<std::array<float, 3>> means(size * size);
+  for (std::size_t i = 0; i < size; ++i) means[i * size + i] = {1, 1, 1};
+  const PatchMatrix matrix(patches, std::move(means));
+  // The mean over an outgoing patch, from the middle of an incident one and from near its corner.
+  const auto reflected = [&](double theta, double phi) {
+    double sum = 0, all = 0;
+    for (int t = 0; t < 20; ++t)
+      for (int p = 0; p < 20; ++p) {
+        const double theta_o = 35 + 10 * (t + 0.5) / 20, weight = std::sin(2 * theta_o * kPi / 180);
+        sum += weight * matrix.eval(theta, phi, theta_o, 15 * ((p + 0.5) / 20 - 0.5)).r;
+        all += weight;
+      }
+    return sum / all;
+  };
+  EXPECT_NEAR(reflected(40, 0), 1, 0.15);
+  EXPECT_NEAR(reflected(44, 6), 1, 0.15);
+}
+
 TEST(PatchMatrix, ADarkPatchStaysDark) {
   const Patches patches = few();
   const std::size_t size = patches.size();
