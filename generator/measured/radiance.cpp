@@ -6,8 +6,8 @@
 #include <cmath>
 #include <iterator>
 #include <pugixml.hpp>
+#include <sstream>
 
-#include "core/csv.h"
 #include "core/error.h"
 #include "core/parse.h"
 #include "core/text.h"
@@ -20,7 +20,13 @@
 namespace brdfc::measured {
 namespace {
 
-std::string text_of(const pugi::xml_node& node, const char* name) { return trim(node.child_value(name)); }
+/// The text of an element, on one line.
+std::string text_of(const pugi::xml_node& node, const char* name) {
+  std::istringstream in(node.child_value(name));
+  std::string out;
+  for (std::string word; in >> word;) out += (out.empty() ? "" : " ") + word;
+  return out;
+}
 
 /// Radiance ignores the case of names.
 bool same_name(const std::string& a, const std::string& b) {
