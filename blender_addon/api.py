@@ -158,7 +158,8 @@ def start_measured_fits(path):
 
 def measured_fits(path):
     """Fits every model to a file with a measured BRDF: MERL (.binary), RGL (.bsdf), UTIA (.bin),
-    ALTA (.alta, .dat), or a table (.csv). Takes some ten seconds, by the program brdfc.
+    ALTA (.alta, .dat) or Radiance (.xml), or a table (.csv). Takes some ten seconds, by the program
+    brdfc.
 
     Returns a Measured: its `fits` are the models, the closest first, each with `model`,
     `parameters`, `matte` and `error`. Raises MeasuredError without the program, and for a file that

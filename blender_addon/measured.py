@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measured BRDFs: the models that come close to a file of MERL, RGL, UTIA or ALTA, or to a table.
+"""Measured BRDFs: the models that come close to a file that the program reads.
 
 The program brdfc reads the file and fits the models.
 """
@@ -17,8 +17,8 @@ from .packs import pack
 #: What stands for the sum of lobes where a model is asked for.
 SUM = "lobes"
 
-#: Endings of the files that the program reads: MERL, RGL, UTIA, ALTA, and tables.
-ENDINGS = (".binary", ".bsdf", ".bin", ".alta", ".dat", ".csv")
+#: Endings of the files that the program reads: MERL, RGL, UTIA, ALTA, Radiance, and tables.
+ENDINGS = (".binary", ".bsdf", ".bin", ".alta", ".dat", ".xml", ".csv")
 
 
 class MeasuredError(RuntimeError):

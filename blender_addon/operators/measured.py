@@ -35,8 +35,8 @@ class BRDFC_OT_new_measured_material(ModalJob, Operator):
     bl_label = "New Measured Material..."
     bl_description = (
         "Make a material that approximates a measured BRDF: a file of MERL (.binary), RGL "
-        "(.bsdf), UTIA (.bin) or ALTA (.alta, .dat), or a table (.csv). The program brdfc fits "
-        "every model to it"
+        "(.bsdf), UTIA (.bin), ALTA (.alta, .dat) or Radiance (.xml), or a table (.csv). The "
+        "program brdfc fits every model to it"
     )
     bl_options = {"REGISTER", "UNDO"}
 

@@ -115,10 +115,10 @@ void add_measured_command(Command app) {
       "measured",
       "Reads a measured BRDF. Prints its format, its gaps and its albedo, and fits every model to it: a table of the\n"
       "models, the best first, with parameters and error, the fraction of the light that is reflected in other\n"
-      "directions. FILE is from MERL (.binary), RGL (.bsdf), UTIA (.bin) or ALTA as text (.alta, .dat), or a table\n"
-      "(.csv) with the columns theta_i,phi_i,theta_o,phi_o in degrees (theta_i_rad,... in radians), or\n"
-      "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z, and r,g,b in 1/sr, with one row for each combination of angles. Colours are\n"
-      "linear Rec.709.");
+      "directions. FILE is from MERL (.binary), RGL (.bsdf), UTIA (.bin), ALTA as text (.alta, .dat) or Radiance\n"
+      "(.xml), or a table (.csv) with the columns theta_i,phi_i,theta_o,phi_o in degrees (theta_i_rad,... in\n"
+      "radians), or wi_x,wi_y,wi_z,wo_x,wo_y,wo_z, and r,g,b in 1/sr, with one row for each combination of angles.\n"
+      "Colours are linear Rec.709.");
   cmd.add_option("file", o->file, "The file").required();
   cmd.add_flag("--json", o->json, "Print JSON");
   cmd.add_option("--models", o->models, "Names of the models to fit, separated by commas; all, or none")

@@ -8,6 +8,7 @@
 #include "measured/alta.h"
 #include "measured/csv_grid.h"
 #include "measured/merl.h"
+#include "measured/radiance.h"
 #include "measured/rgl.h"
 #include "measured/utia.h"
 
@@ -22,8 +23,9 @@ Measurement read(const std::filesystem::path& path, const ToRgb& to_rgb) {
   if (extension == ".bsdf") return read_rgl(path, to_rgb);
   if (extension == ".bin") return read_utia(path);
   if (extension == ".alta" || extension == ".dat") return read_alta(path);
+  if (extension == ".xml") return read_radiance(path);
   if (extension == ".csv") return read_csv_grid(path);
-  input_error("{}: expected a name that ends with one of {}: MERL, RGL, UTIA, ALTA or a table", path.string(),
+  input_error("{}: expected a name that ends with one of {}: MERL, RGL, UTIA, ALTA, Radiance or a table", path.string(),
               fmt::join(kExtensions, ", "));
 }
 

@@ -7,6 +7,7 @@
 //                   SIGGRAPH Asia 2018
 //   UTIA .bin       J. Filip, R. Vavra: Template-Based Sampling of Anisotropic BRDFs, Pacific Graphics 2014
 //   ALTA .alta .dat text of the BRDF library ALTA (measured/alta.h)
+//   Radiance .xml   BSDFs of Radiance and WINDOW (measured/radiance.h)
 //   CSV             a value for every combination of angles (measured/csv_grid.h)
 #pragma once
 
@@ -44,7 +45,7 @@ class Table {
 
 struct Measurement {
   std::string file;
-  std::string format;       ///< "MERL", "RGL", "UTIA", "ALTA" or "CSV"
+  std::string format;       ///< "MERL", "RGL", "UTIA", "ALTA", "Radiance" or "CSV"
   std::string description;  ///< text that the file has about itself, if any
   std::string grid;         ///< resolution, for people
   bool isotropic = true;    ///< unchanged when both directions are rotated about the normal
@@ -64,7 +65,7 @@ inline constexpr std::size_t kFewestPairs = 16;
 /// Throws InputError if a measurement has fewer.
 void require_enough_to_fit(const Measurement&);
 /// The extensions that read_measurement() knows.
-inline constexpr std::array<const char*, 6> kExtensions{".binary", ".bsdf", ".bin", ".alta", ".dat", ".csv"};
+inline constexpr std::array<const char*, 7> kExtensions{".binary", ".bsdf", ".bin", ".alta", ".dat", ".xml", ".csv"};
 
 /// "1 entry is" or "12 entries are"
 std::string counted(std::size_t count, const std::string& one, const std::string& many);

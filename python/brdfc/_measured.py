@@ -88,7 +88,7 @@ class LobeSum:
 
 @dataclass(frozen=True)
 class Measured:
-    """A file with a measured BRDF: RGL, MERL, UTIA, ALTA or a table."""
+    """A file with a measured BRDF: MERL, RGL, UTIA, ALTA or Radiance, or a table."""
 
     path: str
     format: str

@@ -339,7 +339,7 @@ def test_the_operator_makes_the_closest(extension, empty, paint, found, monkeypa
         bpy.ops.brdfc.new_measured_material(filepath=str(paint) + "x")
     handler = bpy.types.FileHandler.bl_rna_get_subclass_py("BRDFC_FH_measured")
     assert handler.bl_import_operator == "brdfc.new_measured_material"
-    assert handler.bl_file_extensions == ".binary;.bsdf;.bin;.alta;.dat"
+    assert handler.bl_file_extensions == ".binary;.bsdf;.bin;.alta;.dat;.xml"
 
 
 @pytest.mark.parametrize(

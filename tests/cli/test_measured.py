@@ -643,7 +643,7 @@ BAD = {
     ),
     "data.xyz": (
         b"",
-        "expected a name that ends with one of .binary, .bsdf, .bin, .alta, .dat, .csv",
+        "expected a name that ends with one of .binary, .bsdf, .bin, .alta, .dat, .xml, .csv",
     ),
 }
 
@@ -888,7 +888,9 @@ def test_azimuths_that_a_tensor_file_lacks_are_said(tmp_path):
     ]
 
 
-@pytest.mark.parametrize("name", ["none.binary", "none.bsdf", "none.bin", "none.alta", "none.csv"])
+@pytest.mark.parametrize(
+    "name", ["none.binary", "none.bsdf", "none.bin", "none.alta", "none.csv", "none.xml"]
+)
 def test_what_is_not_there_is_said(tmp_path, name):
     done = run("measured", tmp_path / name)
     assert done.returncode == 2 and f"{name}: expected a file, found none" in done.stderr

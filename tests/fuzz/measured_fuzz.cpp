@@ -8,8 +8,8 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace brdfc;
   if (size < 1) return 0;
-  const char* names[] = {"a.bsdf", "a.csv", "a.binary", "a.bin", "a.alta"};
-  const auto path = fuzz::write(names[data[0] % 5], data + 1, size - 1);
+  const char* names[] = {"a.bsdf", "a.csv", "a.binary", "a.bin", "a.alta", "a.xml"};
+  const auto path = fuzz::write(names[data[0] % 6], data + 1, size - 1);
   fuzz::expect_value_or_input_error([&] {
     const auto m = measured::read_measurement(path, [](const Xyz& xyz) { return xyz; });
     for (int i = 0; i < 64; ++i) {

@@ -18,6 +18,7 @@ PACKAGES = {
     "libembree3.so.3": "libembree3-3",
     "libfmt.so.9": "libfmt9",
     "libnlopt_cxx.so.0": "libnlopt-cxx0",
+    "libpugixml.so.1": "libpugixml1v5",
     "libstdc++.so.6": "libstdc++6",
     "libtbb.so.12": "libtbb12",
 }
