@@ -156,6 +156,20 @@ class Model:
         complete = defaults | self.fixed | values
         return any(limits.items() <= complete.items() for limits in self.entry["through"])
 
+    def may_mirror(self, values):
+        """Whether the model has an ideal mirror at these values; None stands for one that varies,
+        with which it may."""
+        from ..brdfc import model as formulas
+
+        known = {name: values.get(name) for name in self.parameters} | self.fixed
+        if any(value is None for value in known.values()):
+            return True
+        views = [(0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (0.96, 0.0, 0.28)]
+        try:
+            return bool(formulas(self.name).mirror(views, **known).any())
+        except ValueError:  # as in is_closure()
+            return True
+
     def is_closure(self, values):
         """Whether a closure of Cycles' equals the model at these values; None stands for one that
         is linked. Formula Nodes and the aimed form are then that closure."""

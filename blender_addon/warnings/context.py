@@ -132,7 +132,16 @@ class NodeContext:
     @property
     def declared(self):
         """The codes of the settings and lamps that the form declares itself sensitive to."""
-        return [] if device.is_eevee(self.scene) else self.form.get("warnings", [])
+        codes = [] if device.is_eevee(self.scene) else self.form.get("warnings", [])
+        if "clamp_mirror" in codes and not self.may_mirror:
+            return [code for code in codes if code not in ("clamp_mirror", "multiple_importance")]
+        return codes
+
+    @cached_property
+    def may_mirror(self):
+        """Whether the material may have an ideal mirror: some models do at some values alone."""
+        name, _ = model_nodes.identity(self.node)
+        return pack.model(name).may_mirror(model_nodes.constants(self.node))
 
     @cached_property
     def values(self):

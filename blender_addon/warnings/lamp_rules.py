@@ -100,7 +100,7 @@ def wide_suns(at):
 def small_in_mirror(at):
     """A material with an ideal mirror is under lamps of at most 5 cm, or suns of at most 0.02 rad.
     Those without a size do not appear in mirrors."""
-    if "clamp_mirror" not in at.cycles_form.get("warnings", []):
+    if "clamp_mirror" not in at.cycles_form.get("warnings", []) or not at.may_mirror:
         return []
     return _any([x for x in at.lamps if lamps.kind_of(x.data).is_dot_in_mirror(x.data)])
 

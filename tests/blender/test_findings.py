@@ -380,6 +380,16 @@ def test_small_lamps_in_an_ideal_mirror(extension, empty):
     for size in (0.0, 0.1, 0.5):  # mirrors don't show lamps without a size; 0.1 is a new lamp
         lamp.data.shadow_soft_size = size
         assert found(extension, mirror, empty) == {}
+    lamp.data.shadow_soft_size = 0.05
+    for rough, linked, warned in ((0.49, False, True), (0.5, False, False), (0.5, True, True)):
+        extension.api.set_parameters(mirror, rough=rough)  # without a mirror from 0.5 on
+        if linked:
+            (node,) = extension.model_nodes.group_nodes(mirror)
+            texture = mirror.node_tree.nodes.new("ShaderNodeTexNoise")
+            mirror.node_tree.links.new(
+                texture.outputs[0], extension.model_nodes.sockets(node)["rough"]
+            )
+        assert ("small_in_mirror" in found(extension, mirror, empty)) == warned
 
 
 def test_what_is_wrong_with_several_nodes_is_said_once(extension, empty):
