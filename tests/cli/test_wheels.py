@@ -39,8 +39,8 @@ def wheels(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def environment(wheels, tmp_path_factory):
-    """A new environment in which `pip install FOLDER/*.whl` installed these wheels without a network.
-    Of the packages installed here, it has only NumPy."""
+    """A new environment in which `pip install FOLDER/*.whl` installed these wheels, without a
+    network. Of the packages installed here, it has only NumPy."""
     folder = tmp_path_factory.mktemp("environment")
     succeeded([sys.executable, "-m", "venv", "--without-pip", folder / "venv"])
     numpy = folder / "numpy"
