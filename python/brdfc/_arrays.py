@@ -221,7 +221,8 @@ class ArrayModel:
             {"cos_theta_o": cos_theta_o, "phi_o": phi_o}, parameters
         )
         xp = self.namespace
-        sine = np.sqrt((1.0 - cosine) * (1.0 + cosine))
+        # Rounding may have made a cosine of 1 larger.
+        sine = np.sqrt(np.maximum((1.0 - cosine) * (1.0 + cosine), 0.0 * cosine))
         wo = xp.moveaxis(np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], ()), 0, -1)
         given = {**parameters, **values}
         # One more axis, of samples, after those that all share.
