@@ -113,7 +113,10 @@ class Functions:
         return power(self.array(x), self.array(y))
 
     def maximum(self, x, y):
-        return self.xp.maximum(self._guard(x), self._guard(y))
+        # Formulas state the bound second. Where both are equal, as at the default of a parameter,
+        # the slope is that of what is bounded, and not the mean that libraries' maximum() has.
+        x, y = self._guard(x), self._guard(y)
+        return self.where(x >= y, x, y)
 
     def minimum(self, x, y):
         return self.xp.minimum(self.array(x), self.array(y))
