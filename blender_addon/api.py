@@ -551,9 +551,10 @@ def albedo(model, cos_theta_o, **parameters):
     """Directional albedo (r, g, b) from the model's table. Raises ValueError."""
     from .packs import energy
 
-    if not isinstance(cos_theta_o, Real) or not 0 < cos_theta_o <= 1:
+    # Rounding may have made a cosine of 1 larger.
+    if not isinstance(cos_theta_o, Real) or not 0 < cos_theta_o <= 1 + 1e-6:
         raise ValueError(f"cos_theta_o: expected a number in (0, 1], got {cos_theta_o!r}")
-    return energy.albedo(model, _checked(model, "auto", parameters)[1], cos_theta_o)
+    return energy.albedo(model, _checked(model, "auto", parameters)[1], min(cos_theta_o, 1.0))
 
 
 def used_materials():

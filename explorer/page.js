@@ -41,15 +41,26 @@ function changed({ model, values }) {
   return BRDFC.models[model].parameters.filter((p) => !same(values[p.name], p.default)).map((p) => [p, values[p.name]]);
 }
 
+/** The number that a text is; NaN for others, also for the empty one and for "0x20", which Number() takes. */
+const numberOf = (text) => (/^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(text.trim()) ? Number(text) : NaN);
+
 /** A value of text like "0.5", "0.5:0.1:0.2" or a choice; undefined if the parameter does not take it. */
 function parsed(parameter, text) {
   if (parameter.kind === "choice") return parameter.choices.includes(text) ? text : undefined;
-  const numbers = text.trim().split(/[\s:,]+/).map(Number);
-  if (!text.trim() || numbers.some((x) => !Number.isFinite(x))) return undefined;
-  if (parameter.kind === "number")
-    return numbers.length === 1 && numbers[0] >= parameter.min && numbers[0] <= parameter.max ? numbers[0] : undefined;
+  if (parameter.kind === "number") {
+    // Many people write a comma where others have a point.
+    const number = numberOf(text.replace(",", "."));
+    return number >= parameter.min && number <= parameter.max ? number : undefined;
+  }
+  const numbers = text.trim().split(/\s*[:,]\s*|\s+/).map(numberOf);
   const color = numbers.length === 1 ? [numbers[0], numbers[0], numbers[0]] : numbers;
   return color.length === 3 && color.every((x) => x >= 0 && x <= 1) ? color : undefined;
+}
+
+/** What parsed() takes, also of an option. */
+function expected({ kind, choices, min, max }) {
+  if (choices) return `expected ${choices.join(" or ")}`;
+  return kind === "color" ? "expected a number from 0 to 1, or three as in 0.5:0.1:0.2" : `expected a number from ${min} to ${max}`;
 }
 
 /** A colour as text: one number if it is grey. */
@@ -114,14 +125,29 @@ function addressOf() {
   return `#${parts.join("&")}`;
 }
 
+/** The text of an address; mail programs write some of its characters as "%3A". */
+function decoded(hash) {
+  try {
+    return decodeURIComponent(hash);
+  } catch {
+    return hash;
+  }
+}
+
+/** What is before the first "=" and after it; undefined if there is none. */
+function assignmentOf(text) {
+  const at = text.indexOf("=");
+  return at < 0 ? [text, undefined] : [text.slice(0, at), text.slice(at + 1)];
+}
+
 /** Reads the address; returns what in it was not understood. */
 function readAddress(hash) {
   const wrong = [];
   state.slots = [];
   state.lamp = FIRST_LAMP;
   for (const [name, option] of Object.entries(OPTIONS)) state[name] = option.default;
-  for (const part of hash.replace(/^#/, "").split("&").filter(Boolean)) {
-    const [name, text] = [part.split("=", 1)[0], part.slice(part.indexOf("=") + 1)];
+  for (const part of decoded(hash).replace(/^#/, "").split("&").filter(Boolean)) {
+    const [name, text = ""] = assignmentOf(part);
     if (name === "m") {
       const [model, ...assignments] = text.split(",");
       if (!Object.hasOwn(BRDFC.models, model) || state.slots.length === MOST_MODELS) {
@@ -130,22 +156,22 @@ function readAddress(hash) {
       }
       const values = defaultsOf(model);
       for (const assignment of assignments) {
-        const [key, value] = assignment.split("=");
+        const [key, value = ""] = assignmentOf(assignment);
         const p = BRDFC.models[model].parameters.find((q) => q.name === key);
-        const read = p && value !== undefined ? parsed(p, value) : undefined;
-        if (read === undefined) wrong.push(`${model}: ${assignment}`);
+        const read = p && parsed(p, value);
+        if (read === undefined) wrong.push(`${model}: ${assignment}${p ? `, ${expected(p)}` : ""}`);
         else values[key] = read;
       }
       state.slots.push({ model, values });
     } else if (name === "lamp") {
-      const place = text.split(":").map(Number);
+      const place = text.split(":").map(numberOf);
       if (place.length === 2 && place.every((x) => Math.abs(x) <= 2)) state.lamp = place;
-      else wrong.push(part);
+      else wrong.push(`${part}, expected two numbers from -2 to 2, as in 0.1:0.2`);
     } else if (Object.hasOwn(OPTIONS, name)) {
       const { choices, min, max } = OPTIONS[name];
-      const value = choices ? text : Number(text);
+      const value = choices ? text : numberOf(text);
       if (choices ? choices.includes(value) : value >= min && value <= max) state[name] = value;
-      else wrong.push(part);
+      else wrong.push(`${part}, ${expected(OPTIONS[name])}`);
     } else wrong.push(part);
   }
   if (!state.slots.length) state.slots = FIRST_MODELS.map((model) => ({ model, values: defaultsOf(model) }));
@@ -356,35 +382,54 @@ const DRAWN = { slice: drawSlice, albedo: drawAlbedo, difference: drawDifference
 
 // ---- Controls -----------------------------------------------------------------------------------
 
+/** A field for a parameter's value, and what is wrong with its text. `take` gets a value that the parameter takes. */
+function valueField(p, attributes, textOf, take) {
+  const wrong = make("span", { class: "wrong", role: "alert" });
+  const say = (text) => {
+    wrong.textContent = text;
+    field.setAttribute("aria-invalid", text !== "");
+  };
+  const field = make("input", {
+    type: "text", spellcheck: "false", autocomplete: "off", ...attributes,
+    onchange: () => {
+      const value = parsed(p, field.value);
+      if (value === undefined) {
+        say(`${expected(p)}; still ${textOf()}`);
+        return;
+      }
+      take(value);
+      show();
+    },
+  });
+  const show = () => {
+    field.value = textOf();
+    say("");
+  };
+  show();
+  return { field, wrong, show };
+}
+
 function numberControl(slot, p, id, update) {
   const slider = make("input", {
     type: "range", id, min: 0, max: 1, step: 0.001, "aria-describedby": `${id}-doc`,
     oninput: () => {
       slot.values[p.name] = valueAt(p, Number(slider.value));
-      number.value = slot.values[p.name];
+      show();
       describe();
       update();
     },
   });
-  const number = make("input", {
-    type: "number", min: p.min, max: p.max, step: "any", "aria-label": `${p.label}, value`,
-    onchange: () => {
-      const value = parsed(p, number.value);
-      if (value === undefined) {
-        number.value = slot.values[p.name];
-        return;
-      }
-      slot.values[p.name] = value;
-      slider.value = placeOf(p, value);
-      describe();
-      update();
-    },
+  const attributes = { class: "number", inputmode: "decimal", "aria-label": `${p.label}, value` };
+  const { field, wrong, show } = valueField(p, attributes, () => String(slot.values[p.name]), (value) => {
+    slot.values[p.name] = value;
+    slider.value = placeOf(p, value);
+    describe();
+    update();
   });
-  const describe = () => slider.setAttribute("aria-valuetext", `${number.value} ${p.unit}`.trim());
-  number.value = slot.values[p.name];
+  const describe = () => slider.setAttribute("aria-valuetext", `${slot.values[p.name]} ${p.unit}`.trim());
   slider.value = placeOf(p, slot.values[p.name]);
   describe();
-  return [slider, number];
+  return [slider, field, wrong];
 }
 
 function colorControl(slot, p, id, update) {
@@ -392,25 +437,18 @@ function colorControl(slot, p, id, update) {
     type: "color", id, "aria-describedby": `${id}-doc`,
     oninput: () => {
       slot.values[p.name] = colorOf(swatch.value);
-      text.value = colorText(slot.values[p.name], ", ");
+      show();
       update();
     },
   });
-  const text = make("input", {
-    type: "text", "aria-label": `${p.label}, linear red, green, blue`, title: "Linear red, green, blue, or one number for grey", spellcheck: "false",
-    onchange: () => {
-      const value = parsed(p, text.value);
-      if (value !== undefined) {
-        slot.values[p.name] = value;
-        swatch.value = hexOf(value);
-        update();
-      }
-      text.value = colorText(slot.values[p.name], ", ");
-    },
+  const attributes = { "aria-label": `${p.label}, linear red, green, blue`, title: "Linear red, green, blue, or one number for grey" };
+  const { field, wrong, show } = valueField(p, attributes, () => colorText(slot.values[p.name], ", "), (value) => {
+    slot.values[p.name] = value;
+    swatch.value = hexOf(value);
+    update();
   });
   swatch.value = hexOf(slot.values[p.name]);
-  text.value = colorText(slot.values[p.name], ", ");
-  return [swatch, text];
+  return [swatch, field, wrong];
 }
 
 function choiceControl(slot, p, id, update) {
@@ -473,6 +511,11 @@ function recipeList(slot) {
   });
 }
 
+/** Makes the recipes of all models anew: they hold the slice's directions. */
+function showRecipes() {
+  document.querySelectorAll("#slots .copies").forEach((copies, k) => copies.replaceChildren(...recipeList(state.slots[k])));
+}
+
 function modelMenu(slot, k) {
   const menu = make("select", {
     "aria-label": `Model ${k + 1}`,
@@ -493,7 +536,7 @@ function modelMenu(slot, k) {
 
 function slotCard(slot, k) {
   const model = BRDFC.models[slot.model];
-  const copies = make("div");
+  const copies = make("div", { class: "copies" });
   const update = () => {
     copies.replaceChildren(...recipeList(slot));
     changedState("pictures", "slice", "albedo", "difference");
@@ -611,6 +654,7 @@ function begin() {
     byId(name).addEventListener("input", () => {
       state[name] = Number(byId(name).value);
       showOptions();
+      showRecipes();
       changedState(...drawn);
     });
   for (const name of ["quantity", "plot", "scale", "channel"])

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // brdfc albedo: the directional albedo as a function of the view cosine.
+#include <algorithm>
 #include <iostream>
 #include <optional>
 
@@ -78,10 +79,11 @@ void add_albedo_command(Command app) {
     } else {
       std::vector<double> row;
       while (in->next(row)) {
-        const bool inside = measure::two_sided(model, *bound.brdf) && row[0] < 0 && row[0] >= -1;
-        if (!inside && !(row[0] > 0 && row[0] <= 1))
+        const double most = 1 + 1e-6;  // as lengths of directions
+        const bool inside = measure::two_sided(model, *bound.brdf) && row[0] < 0 && row[0] >= -most;
+        if (!inside && !(row[0] > 0 && row[0] <= most))
           input_error("{}: cos_theta_o: expected a number in (0, 1], got {}", in->where(), row[0]);
-        write(row[0]);
+        write(std::clamp(row[0], -1., 1.));
       }
     }
     out.flush();

@@ -14,6 +14,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// The folder as pip takes it: a name alone would be that of a package of the index, which pip downloads.
+std::string for_pip(const fs::path& folder) {
+  const std::string text = folder.string();
+  return text.find('/') == std::string::npos ? "./" + text : text;
+}
+
 void run(const fs::path& out) {
   const fs::path package = out / "brdfc";
   pack::require_package(package);
@@ -29,8 +35,8 @@ void run(const fs::path& out) {
               fmt::format(R"(["brdfc-tool =={}"])", BRDFC_VERSION));
   pack::write_text(out / "pyproject.toml", text);
   pack::write_text(out / "LICENSE", pack::read_text(data_path("LICENSE")));
-  std::cerr << "brdfc python: " << files.size() << " modules in " << package.string() << "; pip wheel " << out.string()
-            << " makes a wheel of them\n";
+  std::cerr << "brdfc python: " << files.size() << " modules in " << package.string() << "; `pip install "
+            << for_pip(out) << "` installs them, `pip wheel --no-deps " << for_pip(out) << "` makes a wheel of them\n";
 }
 
 }  // namespace
@@ -40,7 +46,7 @@ void add_python_command(Command app) {
   const Command cmd =
       app.add_subcommand("python",
                          "Writes the Python package `brdfc`: every model's formulas on NumPy arrays, in double\n"
-                         "precision, with pyproject.toml. `pip install DIR` installs it.");
+                         "precision, with pyproject.toml. `pip install ./DIR` installs it.");
   cmd.add_option("--out", *out, "Folder for the package").required();
   cmd.callback([out] { run(*out); });
 }

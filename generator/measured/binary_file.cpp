@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "measured/binary_file.h"
 
+#include <cmath>
+
 namespace brdfc::measured {
 
 std::ifstream open_file(const std::filesystem::path& path, std::ios::openmode mode) {
@@ -26,6 +28,16 @@ void BinaryFile::seek(std::uint64_t place) {
 std::string BinaryFile::text(std::size_t count, const std::string& what) {
   const std::vector<char> all = numbers<char>(count, what);
   return {all.begin(), all.end()};
+}
+
+std::string BinaryFile::doubt_of_size(std::uint64_t expected, std::uint64_t doubles) const {
+  if (size_ == expected - doubles / 2) return ": are these numbers in single precision?";
+  return size_ < expected ? ": truncated?" : "";
+}
+
+std::string expected_instead_of(double value) {
+  if (!std::isfinite(value)) return "expected finite numbers";
+  return "expected reflectances in little-endian byte order, which this is too large for: is the byte order reversed?";
 }
 
 void BinaryFile::read(void* to, std::size_t bytes, const std::string& what) {

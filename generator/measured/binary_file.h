@@ -38,6 +38,9 @@ class BinaryFile {
   template <class N> N number(const std::string& what) { return numbers<N>(1, what)[0]; }
   std::string text(std::size_t count, const std::string& what);
 
+  /// What may be wrong if the file has not the `expected` size, of which `doubles` bytes are doubles; "" if no guess.
+  std::string doubt_of_size(std::uint64_t expected, std::uint64_t doubles) const;
+
  private:
   void read(void* to, std::size_t bytes, const std::string& what);
 
@@ -45,5 +48,8 @@ class BinaryFile {
   std::ifstream in_;
   std::uint64_t size_ = 0, place_ = 0;
 };
+
+/// Of a number that is too large for a float: what was expected.
+std::string expected_instead_of(double);
 
 }  // namespace brdfc::measured

@@ -85,6 +85,16 @@ bool above_horizon(std::size_t entry) {
   return wi.z > 0 && wo.z > 0;
 }
 
+/// Whether the header's numbers are right when the bytes of each are reversed.
+bool reversed(const std::vector<std::int32_t>& size) {
+  const auto is = [&](std::size_t k, std::size_t expected) {
+    const auto bytes = std::bit_cast<std::array<unsigned char, 4>>(size[k]);
+    return (std::size_t(bytes[0]) << 24 | std::size_t(bytes[1]) << 16 | std::size_t(bytes[2]) << 8 | bytes[3]) ==
+           expected;
+  };
+  return is(0, kMerlThetaH) && is(1, kMerlThetaD) && is(2, kMerlPhiD);
+}
+
 }  // namespace
 
 HalfDifference half_difference(const Vec3<double>& wi, const Vec3<double>& wo) {
@@ -121,12 +131,13 @@ Measurement read_merl(const std::filesystem::path& path) {
   BinaryFile file(path);
   const auto size = file.numbers<std::int32_t>(3, "header");
   if (size[0] != int(kMerlThetaH) || size[1] != int(kMerlThetaD) || size[2] != int(kMerlPhiD))
-    input_error("{}: header: expected {} x {} x {} values of theta_h, theta_d and phi_d, found {} x {} x {}",
-                file.name(), kMerlThetaH, kMerlThetaD, kMerlPhiD, size[0], size[1], size[2]);
-  constexpr std::uint64_t bytes = 12 + 3 * kMerlEntries * sizeof(double);
+    input_error("{}: header: expected {} x {} x {} values of theta_h, theta_d and phi_d, found {} x {} x {}{}",
+                file.name(), kMerlThetaH, kMerlThetaD, kMerlPhiD, size[0], size[1], size[2],
+                reversed(size) ? ": the byte order is reversed; little-endian numbers are expected" : "");
+  constexpr std::uint64_t doubles = 3 * kMerlEntries * sizeof(double), bytes = 12 + doubles;
   if (file.size() != bytes)
     input_error("{}: expected {} bytes, 3 planes of {} doubles after a header of 12 bytes, got {}{}", file.name(),
-                bytes, kMerlEntries, file.size(), file.size() < bytes ? ": truncated?" : "");
+                bytes, kMerlEntries, file.size(), file.doubt_of_size(bytes, doubles));
   Measurement out;
   std::vector<std::array<float, 3>> values(kMerlEntries);
   std::vector<unsigned char> negative(kMerlEntries);
@@ -136,9 +147,9 @@ Measurement read_merl(const std::filesystem::path& path) {
     for (std::size_t i = 0; i < kMerlEntries; ++i) {
       const double value = plane[i] * kMerlScales[c];
       if (!std::isfinite(float(value)))
-        input_error("{}: {}: expected finite numbers, found {} at entry {}, theta_h {}, theta_d {}, phi_d {}",
-                    file.name(), kPlanes[c], plane[i], i, i / kMerlPhiD / kMerlThetaD, i / kMerlPhiD % kMerlThetaD,
-                    i % kMerlPhiD);
+        input_error("{}: {}: found {} at entry {}, theta_h {}, theta_d {}, phi_d {}: {}", file.name(), kPlanes[c],
+                    plane[i], i, i / kMerlPhiD / kMerlThetaD, i / kMerlPhiD % kMerlThetaD, i % kMerlPhiD,
+                    expected_instead_of(plane[i]));
       negative[i] += value < 0;
       values[i][c] = float(std::max(value, 0.));
     }

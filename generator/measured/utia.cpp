@@ -18,7 +18,7 @@ Measurement read_utia(const std::filesystem::path& path) {
   constexpr std::uint64_t bytes = 3 * kEntries * sizeof(double);
   if (file.size() != bytes)
     input_error("{}: expected {} bytes, 3 planes of {} x {} doubles, got {}{}", file.name(), bytes, kDirections,
-                kDirections, file.size(), file.size() < bytes ? ": truncated?" : "");
+                kDirections, file.size(), file.doubt_of_size(bytes, bytes));
   auto table = std::make_shared<GridTable>();
   for (std::size_t i = 0; i < kThetas; ++i) table->theta_i.at.push_back(kThetaStep * double(i));
   for (std::size_t i = 0; i < kPhis; ++i) table->phi_i.at.push_back(kPhiStep * double(i));
@@ -32,8 +32,8 @@ Measurement read_utia(const std::filesystem::path& path) {
     const auto plane = file.numbers<double>(kEntries, kPlanes[c]);
     for (std::size_t i = 0; i < kEntries; ++i) {
       if (!std::isfinite(float(plane[i])))
-        input_error("{}: {}: expected finite numbers, found {} in row {}, column {}", file.name(), kPlanes[c], plane[i],
-                    i / kDirections, i % kDirections);
+        input_error("{}: {}: found {} in row {}, column {}: {}", file.name(), kPlanes[c], plane[i], i / kDirections,
+                    i % kDirections, expected_instead_of(plane[i]));
       negative += plane[i] < 0;
       table->values[i][c] = float(std::max(plane[i], 0.));
     }

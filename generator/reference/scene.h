@@ -66,11 +66,13 @@ struct Material {
   std::string representation = "auto";
   /// Owns `model` if that is not a registered one: it looks measured data up, or adds `sum` up.
   std::shared_ptr<const Model> own;
-  /// The lobes of a sum, whose colours and numbers are constant; empty for other materials.
+  /// The lobes of a sum or of layers, whose colours and numbers are constant; empty for other materials.
   std::vector<measured::Lobe> sum;
+  measured::Stack stack = measured::Stack::Sum;
 };
 
-/// Throws InputError naming the first material that is measured data as such, which no other renderer has.
+/// Throws InputError naming the first material that no other renderer has: measured data as such, or layers of which an
+/// upper one is of a model whose albedo no table holds.
 void require_models(const std::vector<Material>&);
 
 /// world = matrix * object + translation

@@ -160,6 +160,7 @@ class MaterialReader {
     for (const measured::Lobe& lobe : lobes)
       resolved[key_of(stack)].push_back({{"model", lobe.model->info().name}, {"parameters", to_json(lobe.values)}});
     material.sum = lobes;
+    material.stack = stack;
     material.own = std::make_shared<measured::SumModel>(std::move(lobes), stack);
     material.model = material.own.get();
   }
@@ -344,12 +345,21 @@ class MaterialReader {
 void read_materials(const JsonView& j, SceneFiles& files, bool alone) { MaterialReader(files, alone).read(j); }
 
 void require_models(const std::vector<Material>& materials) {
-  for (const Material& m : materials)
+  for (const Material& m : materials) {
     if (m.own && m.sum.empty())
       input_error(
           "material {}: measured data are rendered by `brdfc render` alone: expected \"as\" with a model beside "
           "\"measured\"",
           m.id);
+    if (m.stack == measured::Stack::Sum || m.representation == "twin") continue;
+    for (std::size_t k = 0; k + 1 < m.sum.size(); ++k)
+      if (const ModelInfo& info = m.sum[k].model->info(); !info.properties.albedo_table)
+        input_error(
+            "material {}: layer {}: {} has no Albedo output: no table can hold its albedo: only `brdfc render` and "
+            "twins have it "
+            "above other layers",
+            m.id, k + 1, info.label);
+  }
 }
 
 }  // namespace brdfc::reference

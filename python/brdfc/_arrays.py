@@ -113,7 +113,10 @@ class Functions:
         return power(self.array(x), self.array(y))
 
     def maximum(self, x, y):
-        return self.xp.maximum(self._guard(x), self._guard(y))
+        # Formulas state the bound second. Where both are equal, as at the default of a parameter,
+        # the slope is that of what is bounded, and not the mean that libraries' maximum() has.
+        x, y = self._guard(x), self._guard(y)
+        return self.where(x >= y, x, y)
 
     def minimum(self, x, y):
         return self.xp.minimum(self.array(x), self.array(y))
@@ -221,7 +224,8 @@ class ArrayModel:
             {"cos_theta_o": cos_theta_o, "phi_o": phi_o}, parameters
         )
         xp = self.namespace
-        sine = np.sqrt((1.0 - cosine) * (1.0 + cosine))
+        # Rounding may have made a cosine of 1 larger.
+        sine = np.sqrt(np.maximum((1.0 - cosine) * (1.0 + cosine), 0.0 * cosine))
         wo = xp.moveaxis(np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], ()), 0, -1)
         given = {**parameters, **values}
         # One more axis, of samples, after those that all share.

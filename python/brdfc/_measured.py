@@ -13,7 +13,7 @@ from os import PathLike
 import numpy as np
 from numpy.typing import NDArray
 
-from ._model import real
+from ._model import ROUNDING, real
 
 Array = NDArray[np.float64]
 _COLUMNS = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z"
@@ -115,8 +115,9 @@ class Measured:
     def albedo(self, cos_theta_o) -> Array:
         """The share of a white world's light that is reflected, (..., 3), over all azimuths."""
         cosine = real("cos_theta_o", cos_theta_o, "numbers in (0, 1]")
-        if not ((cosine > 0.0018) & (cosine <= 1)).all():
+        if not ((cosine > 0.0018) & (cosine <= 1 + ROUNDING)).all():
             raise ValueError("cos_theta_o: expected numbers from 0.0018 to 1")
+        cosine = np.minimum(cosine, 1)
         at = ",".join(map(repr, np.degrees(np.arccos(cosine)).ravel().tolist()))
         told = _json(self.path, "--models", "none", "--at", at)
         return np.array([view["rgb"] for view in told["albedo"]]).reshape(*cosine.shape, 3)

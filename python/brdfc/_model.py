@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 #: Points that a formula takes at a time: what it holds between two steps then stays in the cache.
 BLOCK = 8192
 
+#: What lengths of directions may be off 1 by, and cosines above 1.
+ROUNDING = 1e-6
+
 #: A sample that is lost: the direction, the weight and the pdf.
 LOST = (0.0, 0.0, 1.0, 0.0, 0.0)
 
@@ -197,9 +200,11 @@ class Model:
         phi = real(f"{self.name}: phi_o", phi_o, "numbers")
         if not np.all(np.isfinite(phi)):
             raise ValueError(f"{self.name}: phi_o: expected finite numbers")
-        if not np.all((np.abs(cosine) <= 1) & (cosine != 0) & ((cosine > 0) | self.two_sided)):
+        known = np.abs(cosine) <= 1 + ROUNDING
+        if not np.all(known & (cosine != 0) & ((cosine > 0) | self.two_sided)):
             least = "[-1, 1], not 0" if self.two_sided else "(0, 1]"
             raise ValueError(f"{self.name}: cos_theta_o: expected numbers in {least}")
+        cosine = np.clip(cosine, -1, 1)
         sine = np.sqrt((1 - cosine) * (1 + cosine))
         wo = np.stack(np.broadcast_arrays(sine * np.cos(phi), sine * np.sin(phi), cosine), axis=-1)
         total = self.mirror(wo, **parameters) + self.transmit(wo, **parameters)
@@ -263,8 +268,8 @@ class Model:
         array = self._vectors(name, value)
         x, y, z = array[..., 0], array[..., 1], array[..., 2]
         length = np.sqrt(x * x + y * y + z * z)
-        if not np.all(np.abs(length - 1) <= 1e-6):
-            wrong = np.ravel(length)[~(np.abs(np.ravel(length) - 1) <= 1e-6)][0]
+        if not np.all(np.abs(length - 1) <= ROUNDING):
+            wrong = np.ravel(length)[~(np.abs(np.ravel(length) - 1) <= ROUNDING)][0]
             raise ValueError(
                 f"{self.name}: {name}: expected unit vectors, the length of one is {wrong:.9g}"
             )

@@ -291,6 +291,19 @@ def test_a_coat_lies_over_any_nodes(extension, empty, native):
     assert np.abs(picture - 1).max() < 0.02
 
 
+@pytest.mark.parametrize("model", ["disney", "eon", "factors", "hapke", "thin_film"])
+def test_models_without_an_albedo_are_coats_as_twins(extension, empty, model):
+    """As docs/blender.md says, and where they lie below a coat."""
+    material = helpers.node_material("ShaderNodeBsdfDiffuse")
+    nodes = material.node_tree.nodes
+    names = set(nodes.keys())
+    with pytest.raises(ValueError, match="has no Albedo output"):
+        extension.api.add_coat(material, model)
+    assert set(nodes.keys()) == names
+    assert extension.api.add_coat(material, model, "twin").outputs["Albedo"].is_linked
+    extension.api.new_layers([("microfacet", {}), (model, {})])
+
+
 def test_nothing_to_coat(extension, empty):
     material = bpy.data.materials.new("Bare")
     extension.nodes.empty_tree(material)

@@ -12,8 +12,14 @@ import subprocess
 import time
 
 import pytest
-from support import LISTED, MODELS, TOOL, scene
+from support import LISTED, MODELS, ROOT, TOOL, scene
 
+#: The labels of models whose albedo no table holds.
+UNTABULATED = {
+    m["name"]: m["label"]
+    for m in LISTED
+    if ".albedo_table = false" in (ROOT / f"generator/models/{m['name']}.cpp").read_text("utf-8")
+}
 DIRECTIONS = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z\n0,0,1,0,0.6,0.8\n0.6,0,0.8,0,0,1\n"
 
 
@@ -147,6 +153,25 @@ def test_running_out_of_memory_is_said(tmp_path):
     assert done.returncode == 1
     assert done.stderr.startswith("brdfc: out of memory") and done.stderr.count("\n") == 1
     assert not out.exists()
+
+
+@pytest.mark.parametrize("model", sorted(UNTABULATED))
+def test_an_upper_layer_needs_an_albedo_in_blender(model, tmp_path):
+    """As Blender's node of such a model says; twins have one. Below others, and in a sum, it
+    needs none."""
+    file = tmp_path / "s.json"
+    pair = [{"model": model}, {"model": "lambert"}]
+    for material, code in (
+        ({"layers": pair}, 2),
+        ({"layers": pair, "representation": "twin"}, 0),
+        ({"layers": pair[::-1]}, 0),
+        ({"sum": pair}, 0),
+    ):
+        file.write_text(json.dumps(scene(materials={"m": material})), encoding="utf-8")
+        done = brdfc("scene", file, "--out", tmp_path / "out")
+        assert done.returncode == code, done.stderr
+        said = f"material m: layer 1: {UNTABULATED[model]} has no Albedo output"
+        assert (said in done.stderr) == (code == 2)
 
 
 def test_a_resolved_scene_is_the_same_bytes_again(tmp_path):

@@ -121,6 +121,30 @@ attempt("address", () => {
   found.controls = controls.length;
   readAddress(address);
   found.recipes = recipes(state.slots[0]).map(([, text]) => text);
+  readAddress("#m=ward&m=lambert&theta=30");
+  rebuild();
+  for (const [name, value] of [["theta", 60], ["azimuth", 90]]) {
+    byId(name).value = value;
+    byId(name).dispatchEvent(new Event("input"));
+  }
+  const shown = (e) => e.querySelector("pre").textContent;
+  found.copies = [...document.querySelectorAll(".copies")].map(shown);
+  const [ax, ks] = ["ax", "ks"].map((name) => byId(`p0-${name}`).parentElement);
+  const type = (row, text) => {
+    const field = row.querySelector("input[type=text]");
+    field.value = text;
+    field.dispatchEvent(new Event("change"));
+    const said = row.querySelector(".wrong").textContent;
+    return [field.value, said, field.getAttribute("aria-invalid")];
+  };
+  found.typed = ["7", "", "0,5"].map((text) => type(ax, text));
+  found.typed.push(type(ks, "0.1 0.2"), type(ks, "0.1 0.2, 0.3"));
+  found.held = addressOf();
+  found.mailed = readAddress(`#${encodeURIComponent("m=ward,ax=0.3,ks=0.1:0.2:0.3&theta=30")}`);
+  found.read = addressOf();
+  const parts = ["theta=", "theta", "lamp=:", "theta=0x20", "theta=%"];
+  const models = ["m=ward,ks=:0.5:0.2", "m=ward,ks=0.1::0.3", "m=ward,ax"];
+  found.half = [...models, ...parts].map((text) => readAddress(`#${text}`));
   found.wrong = readAddress("#m=nothing&m=ward,ax=7&theta=95&other=1");
   HTMLCanvasElement.prototype.getContext = () => null;
   try {
@@ -349,6 +373,37 @@ def test_a_link_carries_the_settings(found):
     assert command.endswith(" | brdfc eval ward ks=0.1,0.2,0.3 ax=0.3 normalisation=duer")
     for text in (python.removesuffix(")"), blender):
         assert text.endswith('ks=(0.1, 0.2, 0.3), ax=0.3, normalisation="duer")')
+
+
+def test_what_is_copied_follows_the_slice(found):
+    for text in found["copies"]:
+        wi, wo = np.array(text.split("\\n")[1].split(","), float).reshape(2, 3)
+        assert wi == pytest.approx([0, -(0.75**0.5), 0.5]), text
+        assert wo == pytest.approx([0, 0.75**0.5, 0.5]), text
+    assert len(found["copies"]) == 2
+
+
+def test_a_field_says_what_it_expects(found):
+    out, empty, comma, two, three = found["typed"]
+    assert out == ["7", "expected a number from 0.0001 to 1; still 0.15", "true"]
+    assert empty[1:] == out[1:]
+    assert comma == ["0.5", "", "false"]
+    assert "or three as in 0.5:0.1:0.2" in two[1] and two[2] == "true"
+    assert three == ["0.1, 0.2, 0.3", "", "false"]
+    assert "ks=0.1:0.2:0.3" in found["held"] and "ax=0.5" in found["held"]
+
+
+def test_a_link_that_was_mailed_is_read(found):
+    assert found["mailed"] == []
+    assert found["read"] == "#m=ward,ks=0.1:0.2:0.3,ax=0.3&theta=30"
+
+
+def test_a_part_of_a_link_that_is_left_out_is_said(found):
+    assert [len(wrong) for wrong in found["half"]] == [1] * len(found["half"])
+    assert found["half"][0] == [
+        "ward: ks=:0.5:0.2, expected a number from 0 to 1, or three as in 0.5:0.1:0.2"
+    ]
+    assert found["half"][3] == ["theta=, expected a number from 0 to 89"]
 
 
 def test_a_copied_command_runs(found):

@@ -537,7 +537,21 @@ BAD = {
     "nan.binary": (merl(np.where(np.arange(len(FLAT))[:, None] == 7, np.nan, 1) + FLAT), "entry 7"),
     "holes.binary": (merl(FLAT - 1), "expected values above the horizon, found none"),
     "short.bin": (bytes(1000), "expected 1990656 bytes"),
-    "nan.bin": (utia(np.full((288 * 288, 3), np.nan)), "red: expected finite numbers"),
+    "float.binary": (
+        merl(FLAT + 1)[:12] + np.ones(FLAT.size, np.float32).tobytes(),
+        "got 17496012: are these numbers in single precision?",
+    ),
+    "turned.binary": (struct.pack(">3i", 90, 90, 180), "the byte order is reversed"),
+    "half_turned.binary": (
+        merl(FLAT)[:12] + np.full(FLAT.size, 0.7, ">f8").tobytes(),
+        "is the byte order reversed?",
+    ),
+    "nan.bin": (utia(np.full((288 * 288, 3), np.nan)), "column 0: expected finite numbers"),
+    "turned.bin": (np.full(288 * 288 * 3, 0.7, ">f8").tobytes(), "is the byte order reversed?"),
+    "float.bin": (
+        np.ones(288 * 288 * 3, np.float32).tobytes(),
+        "got 995328: are these numbers in single precision?",
+    ),
     "not.bsdf": (bytes(1000), "expected a tensor file"),
     "short.bsdf": (changed()[:-1], "truncated?"),
     "head.bsdf": (changed()[:40], "truncated?"),

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from support import MODELS, TOOL
+from support import LISTED, MODELS, TOOL
 
 
 class Autograd:
@@ -280,6 +280,34 @@ def test_gradients_are_finite_differences(brdfc, differentiating, name):
     assert some > 20
 
 
+#: Models with a parameter whose default is an end of its range.
+AT_ENDS = [
+    (m["name"], p["name"])
+    for m in LISTED
+    for p in m["parameters"]
+    if p["kind"] == "number" and p["default"] in (p["min"], p["max"]) and m["scatter"]
+]
+
+
+@pytest.mark.parametrize(("name", "parameter"), AT_ENDS)
+def test_a_default_at_an_end_has_the_slope_inside(brdfc, differentiating, name, parameter):
+    """Where a bound equals what it bounds, the slope is not that of the bound."""
+    model, random = brdfc.model(name), np.random.default_rng(6)
+    at = model.parameters[parameter]
+    inside = 1e-5 if at.default == at.min else -1e-5
+    wi, wo = above(unit(random.normal(size=(2, 16, 3))))
+    for what in ("eval", "pdf"):
+        call = Call(what, 2, [parameter], {})
+        values = [wi, wo, np.full(len(wi), at.default)]
+        array = differentiating.xp.asarray
+        on = model.on(differentiating.xp)
+        got = differentiating.gradients(call.total(on), [array(v) for v in values])[2]
+        f = [call(model, wi, wo, values[2] + k * inside) for k in range(3)]
+        expected = (-3 * f[0] + 4 * f[1] - f[2]) / (2 * inside)
+        allowed = 1e-4 * np.abs(expected).max() + 1e-9 * np.abs(f[0]).max()  # differences round
+        np.testing.assert_allclose(differentiating.numpy(got), expected, 1e-4, allowed)
+
+
 def ends():
     """Pairs of directions at which something in a formula has no derivative."""
     random = np.random.default_rng(4)
@@ -318,7 +346,7 @@ def test_gradients_are_numbers_everywhere(brdfc, differentiating, name, precisio
 def test_albedo_is_that_on_numpy(brdfc, library):
     model = brdfc.model("microfacet")
     on, array = model.on(library.xp), library.xp.asarray
-    cosine, ax = np.array([[0.3], [1.0]]), np.array([0.1, 0.2, 0.4])
+    cosine, ax = np.array([[0.3], [1 + 2.3e-16]]), np.array([0.1, 0.2, 0.4])  # rounded
     f0 = np.full((3, 3), 0.5)
     expected = model.albedo(cosine, 0.3, samples=64, ax=ax, f0=f0)
     got = on.albedo(array(cosine), 0.3, samples=64, ax=array(ax), f0=array(f0))

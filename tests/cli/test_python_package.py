@@ -252,6 +252,17 @@ def test_albedo_is_that_of_the_tools_quadrature(brdfc, name):
         assert np.abs(got - expected[:, 1:4]).max() <= 5e-3 + expected[:, 7].max(), values
 
 
+def test_a_cosine_of_1_may_be_rounded(brdfc):
+    """As lengths of directions may be, also for the tool."""
+    model, more = brdfc.model("rough_glass"), np.array([1 + 2.3e-16, 1 + 9e-7])
+    for sign in (1, -1):
+        assert (model.albedo(sign * more) == model.albedo(sign * 1.0)).all()
+    expected = tool("albedo", "ward", {}, np.ones((1, 1)), "cos_theta_o")
+    assert (tool("albedo", "ward", {}, more[:, None], "cos_theta_o") == expected).all()
+    with pytest.raises(ValueError, match="cos_theta_o"):
+        model.albedo(1 + 2e-6)
+
+
 def test_arrays_broadcast_and_blocks_are_joined(brdfc):
     model, random = brdfc.model("ward"), np.random.default_rng(8)
     wi, wo = unit(np.abs(random.normal(size=(2, 20000, 3))))

@@ -39,8 +39,8 @@ def wheels(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def environment(wheels, tmp_path_factory):
-    """A new environment in which `pip install brdfc[tool]` found these wheels without a network. Of
-    the packages installed here, it has only NumPy."""
+    """A new environment in which `pip install FOLDER/*.whl` installed these wheels, without a
+    network. Of the packages installed here, it has only NumPy."""
     folder = tmp_path_factory.mktemp("environment")
     succeeded([sys.executable, "-m", "venv", "--without-pip", folder / "venv"])
     numpy = folder / "numpy"
@@ -52,7 +52,7 @@ def environment(wheels, tmp_path_factory):
     site = succeeded([python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"])
     Path(site.strip(), "numpy.pth").write_text(f"{numpy}\n")
     pip = [sys.executable, "-m", "pip", "--python", python, "install", "--no-index"]
-    succeeded([*pip, "--find-links", wheels["brdfc"].parent, "brdfc[tool]"])
+    succeeded([*pip, *wheels.values()])
     return folder / "venv"
 
 
