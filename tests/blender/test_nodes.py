@@ -468,8 +468,8 @@ def parallel_disk(scene):
     [("modified_phong", {"e": 20.0}, "exact"), ("ward", {"ax": 0.3, "ay": 0.3}, "aimed")],
 )
 def test_a_narrow_spread(extension, model, values, form, light):
-    """Averaged over the whole lamp, these highlights would be from 40 % too dark to 33 % too bright.
-    The mean light over a cone is known to 2 % (generator/forms/node_cones.h, mean_light())."""
+    """Averaged over the whole lamp, these highlights would be 40 % too dark to 33 % too bright. The
+    mean light over a cone is known to 2 % (generator/forms/node_cones.h, mean_light())."""
     a, b = (blocks_of(extension, model, values, f, light, 256) for f in ("nodes", form))
     off, error, _ = difference(a, b)
     found, wanted = a.mean(0), b.mean(0)

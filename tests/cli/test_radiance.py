@@ -261,7 +261,9 @@ def test_colours_of_trees(tmp_path):
 
 
 def test_text_in_other_encodings(tmp_path):
-    text = bsdf(matrix(np.ones((5, 5)), "s"), described=table("s", SMALL), name="Gewebe,\n gr\u00fcn ")
+    text = bsdf(
+        matrix(np.ones((5, 5)), "s"), described=table("s", SMALL), name="Gewebe,\n gr\u00fcn "
+    )
     for encoding in ("utf-16", "utf-8-sig"):
         content = text.replace('encoding="UTF-8"', "").encode(encoding)
         assert told(write(tmp_path, content))["description"] == "Gewebe, gr\u00fcn, Weaver"
