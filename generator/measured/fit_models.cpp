@@ -35,8 +35,10 @@ constexpr double kBeyond = 100, kBeyondExponent = kBeyond * kBeyond;
 constexpr int kTriesBeyond = 6;  ///< places where narrower highlights than those of the sliders are tried
 /// A search that ends as near to the end of a slider, as a share of it, goes on beyond.
 constexpr double kAtEnd = 0.03;
-/// Turned data are worth a word if the error is so many times smaller, and if it is so large without.
+/// Turned data are worth a word if the error is so many times smaller, and if it is larger than this without.
 constexpr double kWorthTurn = 0.9, kTurnFrom = 0.01;
+/// Turns by more than 45 degrees are told if the error is so many times smaller, and by kTurnFrom more, than with less.
+constexpr double kWorthFarther = 0.8;
 /// Axes that differ by less than this are the same, in radians.
 constexpr double kSameAxes = 0.02;
 
@@ -396,43 +398,43 @@ struct Compared {
   double axis;  ///< see axis_of()
 };
 
-/// How close a problem comes if the data are turned about the normal such that their axes are those of the model.
-std::optional<ModelFit::Turned> turned_fit(Problem& problem, const Compared& data, bool matte) {
-  const auto extra = [&] { return matte ? std::optional(Rgb<double>(0)) : std::nullopt; };
+/// How close a problem comes if the data are turned about the normal, where the tangent is near an angle.
+ModelFit::Turned turned_near(Problem& problem, const Compared& data, bool matte, double angle) {
+  const auto error = [&](const std::vector<double>& t, const Pairs& pairs) {
+    problem.set_numbers(t);
+    std::optional<Rgb<double>> added;
+    if (matte) added = Rgb<double>(0);
+    return problem.solve(pairs, added);
+  };
   const std::size_t n = problem.searched().size();
-  // A model may be wide along either of its axes.
-  const double other = data.axis > 0 ? data.axis - kPi / 2 : data.axis + kPi / 2;
-  double angle = 0, least = std::numeric_limits<double>::infinity();
-  std::vector<double> t;
-  for (const double a : {data.axis, other}) {
-    const Pairs coarse = seen_turned(data.coarse, a);
-    for (int k = 1; k <= kTries * int(n); ++k) {
-      const std::vector<double> place = place_of_try(n, k);
-      problem.set_numbers(place);
-      auto added = extra();
-      const double error = problem.solve(coarse, added);
-      // The smaller turn if either will do.
-      if (error < least * (std::abs(a) < std::abs(angle) ? 1 : 0.95)) least = error, angle = a, t = place;
-    }
+  std::vector<double> best;
+  double least = std::numeric_limits<double>::infinity();
+  const Pairs coarse = seen_turned(data.coarse, angle);
+  for (int k = 1; k <= kTries * int(n); ++k) {
+    std::vector<double> t = place_of_try(n, k);
+    if (const double e = error(t, coarse); best.empty() || e < least) best = std::move(t), least = e;
   }
-  if (t.empty()) return std::nullopt;
+  best.push_back(angle);
   for (const double step : {0.08, 0.01}) {
     std::vector<fit::Variable> variables;
-    for (const double place : t) variables.push_back({place, 0, 1, step});
-    variables.push_back({angle, angle - kPi / 4, angle + kPi / 4, 2 * step});
-    const std::vector<double> found = fit::argmin(variables, [&](const std::vector<double>& x) {
-      problem.set_numbers({x.begin(), x.end() - 1});
-      auto added = extra();
-      return std::min(problem.solve(seen_turned(data.fine, x.back()), added), 1e6);
+    for (std::size_t d = 0; d < n; ++d) variables.push_back({best[d], 0, 1, step});
+    variables.push_back({best[n], best[n] - kPi / 4, best[n] + kPi / 4, 2 * step});
+    best = fit::argmin(variables, [&](const std::vector<double>& x) {
+      return std::min(error({x.begin(), x.end() - 1}, seen_turned(data.fine, x.back())), 1e6);
     });
-    t.assign(found.begin(), found.end() - 1);
-    angle = found.back();
   }
-  problem.set_numbers(t);
-  auto added = extra();
-  const double error = problem.solve(seen_turned(data.last, angle), added);
-  // Half a turn changes nothing.
-  return ModelFit::Turned{-std::remainder(angle, kPi), error};
+  angle = best[n];
+  best.pop_back();
+  // The data have to be turned the other way. Half a turn changes nothing.
+  return {-std::remainder(angle, kPi), error(best, seen_turned(data.last, angle))};
+}
+
+/// The same for the data's axes. A model may be wide along either of its own.
+ModelFit::Turned turned_fit(Problem& problem, const Compared& data, bool matte) {
+  const double flat = std::remainder(data.axis, kPi / 2);
+  const ModelFit::Turned near = turned_near(problem, data, matte, flat);
+  const ModelFit::Turned far = turned_near(problem, data, matte, flat > 0 ? flat - kPi / 2 : flat + kPi / 2);
+  return far.error < kWorthFarther * near.error - kTurnFrom ? far : near;
 }
 
 std::optional<ModelFit> fit_model(const Model& model, const Compared& data, Matte allowed) {
@@ -502,9 +504,9 @@ std::optional<ModelFit> fit_model(const Model& model, const Compared& data, Matt
   const bool turns =
       std::ranges::any_of(problem.searched(), [](const SearchRange& r) { return r.info->unit == "rad"; });
   if (!data.isotropic && !info.properties.isotropic && !turns && best->error > kTurnFrom &&
-      std::abs(std::remainder(data.axis, kPi / 2)) > kSameAxes) {
-    const auto turned = turned_fit(problem, data, best->matte.has_value());
-    if (turned && turned->error < kWorthTurn * best->error) best->turned = turned;
+      !problem.searched().empty() && std::abs(std::remainder(data.axis, kPi / 2)) > kSameAxes) {
+    const ModelFit::Turned turned = turned_fit(problem, data, best->matte.has_value());
+    if (turned.error < kWorthTurn * best->error) best->turned = turned;
   }
   best->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return best;
