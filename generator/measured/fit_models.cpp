@@ -33,6 +33,8 @@ constexpr double kModelsAlike = 0.05, kNegligible = 5e-4;
 /// Exponents go as the inverse square of a width.
 constexpr double kBeyond = 100, kBeyondExponent = kBeyond * kBeyond;
 constexpr int kTriesBeyond = 6;  ///< places where narrower highlights than those of the sliders are tried
+/// A search begins there if they are so many times better than those on the sliders.
+constexpr double kWorthBeyond = 0.9;
 /// A search that ends as near to the end of a slider, as a share of it, goes on beyond.
 constexpr double kAtEnd = 0.03;
 /// Turned data are worth a word if the error is so many times smaller, and if it is larger than this without.
@@ -450,27 +452,31 @@ std::optional<ModelFit> fit_model(const Model& model, const Compared& data, Matt
   for (const bool matte : {false, true}) {
     if (matte && (allowed == Matte::None || info.look == Look::Matte || best->error < kGood)) break;
     const auto extra = [&] { return matte ? std::optional(Rgb<double>(0)) : std::nullopt; };
-    std::vector<Candidate> candidates;
+    std::vector<Candidate> candidates, narrower;
     for (std::size_t i = 0; i < problems.size(); ++i) {
       Problem& problem = problems[i];
-      const std::size_t n = problem.searched().size();
-      const std::size_t first = candidates.size();
-      const auto add = [&](std::vector<double> t) {
+      const std::size_t n = problem.searched().size(), first = candidates.size();
+      const auto tried = [&](std::vector<double> t) {
         problem.set_numbers(t);
         auto added = extra();
         const double error = problem.solve(data.coarse, added);
-        candidates.push_back({i, std::move(t), error});
+        return Candidate{i, std::move(t), error};
       };
       std::vector<double> defaults;
       for (const SearchRange& r : problem.searched()) defaults.push_back(r.place(r.info->value[0]));
-      add(std::move(defaults));
-      for (int k = 1; k <= kTries * int(n); ++k) add(place_of_try(n, k));
+      candidates.push_back(tried(std::move(defaults)));
+      for (int k = 1; k <= kTries * int(n); ++k) candidates.push_back(tried(place_of_try(n, k)));
       const auto nearest =
           std::ranges::min_element(candidates.begin() + long(first), candidates.end(), {}, &Candidate::error);
-      for (std::vector<double>& t : narrower_places(problem.searched(), std::vector(nearest->t))) add(std::move(t));
+      for (std::vector<double>& t : narrower_places(problem.searched(), nearest->t))
+        narrower.push_back(tried(std::move(t)));
     }
     std::ranges::stable_sort(candidates, {}, &Candidate::error);
     if (candidates.size() > kModelStarts) candidates.resize(kModelStarts);
+    // One more, which takes no other's place: those beyond are near one another.
+    const auto narrow = std::ranges::min_element(narrower, {}, &Candidate::error);
+    if (narrow != narrower.end() && narrow->error < kWorthBeyond * candidates.front().error)
+      candidates.push_back(*narrow);
     const auto finish = [&](Candidate& c) {
       Problem& problem = problems[c.problem];
       problem.set_numbers(c.t);
