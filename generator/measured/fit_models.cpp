@@ -32,7 +32,7 @@ constexpr double kModelsAlike = 0.05, kNegligible = 5e-4;
 /// Beyond the sliders, widths are searched for by so many times narrower or wider ones at most: no data resolve more.
 /// Exponents go as the inverse square of a width.
 constexpr double kBeyond = 100, kBeyondExponent = kBeyond * kBeyond;
-constexpr int kTriesBeyond = 6;  ///< places where narrower highlights than those of the sliders are tried
+constexpr int kTriesBeyond = 4;  ///< places where narrower highlights than those of the sliders are tried
 /// A search begins there if they are so many times better than those on the sliders.
 constexpr double kWorthBeyond = 0.9;
 /// A search that ends as near to the end of a slider, as a share of it, goes on beyond.
@@ -41,8 +41,14 @@ constexpr double kAtEnd = 0.03;
 constexpr double kWorthTurn = 0.9, kTurnFrom = 0.01;
 /// Turns by more than 45 degrees are told if the error is so many times smaller, and by kTurnFrom more, than with less.
 constexpr double kWorthFarther = 0.8;
-/// Axes that differ by less than this are the same, in radians.
+/// Axes that differ by less than this are the same, in radians: the estimate is not as exact.
 constexpr double kSameAxes = 0.02;
+
+/// Of the data: none if they are isotropic.
+enum class Axes { None, Aligned, Turned };
+
+/// Whether a number is an angle without ends.
+bool is_circle(const ParamInfo& p) { return p.unit == "rad" && p.soft_max - p.soft_min > 2 * kPi - 1e-6; }
 
 /// Where a number is searched for: places, of which 0 and 1 are the ends of its slider.
 class SearchRange {
@@ -59,8 +65,7 @@ class SearchRange {
         break;
       case AxisScale::Linear:
         // More than the whole circle is the same again.
-        circle_ = p.unit == "rad" && most - least > 2 * kPi - 1e-6;
-        if (!circle_) least = std::max(p.min, least - width_), most = std::min(p.max, most + width_);
+        if (!is_circle(p)) least = std::max(p.min, least - width_), most = std::min(p.max, most + width_);
     }
     low = std::min(0., (scaled(least) - first_) / width_);
     high = std::max(1., (scaled(most) - first_) / width_);
@@ -85,7 +90,7 @@ class SearchRange {
   bool stopped(double t) const {
     constexpr double kNear = 1e-3;
     const bool at_low = t<low + kNear, at_high = t> high - kNear;
-    if (circle_) return false;
+    if (is_circle(*info)) return false;
     if (slider_.scale == AxisScale::Log) return at_low || at_high;
     if (slider_.scale == AxisScale::Log1p) return at_high;
     return (at_low && at(low) > info->min) || (at_high && at(high) < info->max);
@@ -99,22 +104,25 @@ class SearchRange {
 
   ScaledRange slider_;
   double first_, width_;
-  bool circle_ = false;
 };
 
 /// A model with its choices made, and what is searched for.
 class Problem {
  public:
-  Problem(const Model& model, const ParamValues& choices, bool isotropic, const Pairs& pairs)
+  Problem(const Model& model, const ParamValues& choices, Axes axes, const Pairs& pairs)
       : info_(model.info()), values_(complete(info_, choices)), brdf_(model.make_double(values_)) {
     for (const ParamInfo& p : info_.params)
       if (p.kind == ParamKind::Color) colors_.push_back(&p);
     if (brdf_->scatters_through()) return;
     std::vector<const ParamInfo*> numbers;
-    // Isotropic data say nothing of an angle about the normal, which isotropic models do not have.
-    const bool turns_nothing = isotropic && !info_.properties.isotropic;
+    // Isotropic data say nothing of an angle about the normal, which isotropic models do not have. Where the data's
+    // axes are the tangent and the bitangent, no rotation is needed.
+    const auto turns_nothing = [&](const ParamInfo& p) {
+      if (p.unit != "rad" || info_.properties.isotropic) return false;
+      return axes == Axes::None || (axes == Axes::Aligned && is_circle(p));
+    };
     for (const ParamInfo& p : info_.params)
-      if (p.kind == ParamKind::Number && !(turns_nothing && p.unit == "rad")) numbers.push_back(&p);
+      if (p.kind == ParamKind::Number && !turns_nothing(p)) numbers.push_back(&p);
     for (const ParamInfo* p : numbers) {
       if (!matters(*p, numbers, pairs)) {
         without_mirror(*p);
@@ -396,7 +404,7 @@ double axis_of(const Pairs& p) {
 /// What is compared: few pairs for tries, more for searches, most for the error that is told.
 struct Compared {
   Pairs coarse, fine, last;
-  bool isotropic;
+  Axes axes;
   double axis;  ///< see axis_of()
 };
 
@@ -444,7 +452,7 @@ std::optional<ModelFit> fit_model(const Model& model, const Compared& data, Matt
   const ModelInfo& info = model.info();
   std::vector<Problem> problems;
   for (const Choices& choices : choice_combinations(info)) {
-    Problem p(model, with_choices(info, choices), data.isotropic, data.coarse);
+    Problem p(model, with_choices(info, choices), data.axes, data.coarse);
     if (!p.through()) problems.push_back(std::move(p));
   }
   std::optional<ModelFit> best;
@@ -507,10 +515,9 @@ std::optional<ModelFit> fit_model(const Model& model, const Compared& data, Matt
     }
   }
   Problem& problem = problems[best_problem];
-  const bool turns =
-      std::ranges::any_of(problem.searched(), [](const SearchRange& r) { return r.info->unit == "rad"; });
-  if (!data.isotropic && !info.properties.isotropic && !turns && best->error > kTurnFrom &&
-      !problem.searched().empty() && std::abs(std::remainder(data.axis, kPi / 2)) > kSameAxes) {
+  const bool turns = std::ranges::any_of(problem.searched(), [](const SearchRange& r) { return is_circle(*r.info); });
+  if (data.axes == Axes::Turned && !info.properties.isotropic && !turns && best->error > kTurnFrom &&
+      !problem.searched().empty()) {
     const ModelFit::Turned turned = turned_fit(problem, data, best->matte.has_value());
     if (turned.error < kWorthTurn * best->error) best->turned = turned;
   }
@@ -563,8 +570,11 @@ std::vector<ModelFit> fit_models(const Measurement& m, const MeasuredModel& data
                                  const std::function<void(const Model&, std::size_t done)>& progress) {
   if (models.empty()) return {};
   require_enough_to_fit(m);
-  Compared all{make_pairs(data, kCoarse, 1), make_pairs(data, kFine, 2), make_pairs(data, kFinal, 3), m.isotropic, 0};
-  all.axis = axis_of(all.last);
+  Compared all{make_pairs(data, kCoarse, 1), make_pairs(data, kFine, 2), make_pairs(data, kFinal, 3), Axes::None, 0};
+  if (!m.isotropic) {
+    all.axis = axis_of(all.last);
+    all.axes = std::abs(std::remainder(all.axis, kPi / 2)) < kSameAxes ? Axes::Aligned : Axes::Turned;
+  }
   std::vector<std::optional<ModelFit>> found(models.size());
   std::atomic<std::size_t> done{0};
   for_all(models.size(), [&](std::size_t i) {
