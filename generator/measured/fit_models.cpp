@@ -35,6 +35,8 @@ constexpr double kBeyond = 100, kBeyondExponent = kBeyond * kBeyond;
 constexpr int kTriesBeyond = 4;  ///< places where narrower highlights than those of the sliders are tried
 /// A search begins there if they are so many times better than those on the sliders.
 constexpr double kWorthBeyond = 0.9;
+/// Where it ends beyond, so many other choices are searched from there.
+constexpr std::size_t kOtherChoices = 3;
 /// A search that ends as near to the end of a slider, as a share of it, goes on beyond.
 constexpr double kAtEnd = 0.03;
 /// Turned data are worth a word if the error is so many times smaller, and if it is larger than this without.
@@ -381,6 +383,14 @@ bool goes_on_beyond(const std::vector<SearchRange>& searched, const std::vector<
   return false;
 }
 
+bool is_beyond(const std::vector<double>& t) {
+  return std::ranges::any_of(t, [](double place) { return place < 0 || place > 1; });
+}
+
+bool same_numbers(const std::vector<SearchRange>& a, const std::vector<SearchRange>& b) {
+  return std::ranges::equal(a, b, {}, &SearchRange::info, &SearchRange::info);
+}
+
 /// The pairs as a BRDF whose tangent is turned by an angle sees them.
 Pairs seen_turned(Pairs p, double angle) {
   const double c = std::cos(angle), s = std::sin(angle);
@@ -512,6 +522,21 @@ std::optional<ModelFit> fit_model(const Model& model, const Compared& data, Matt
     if (goes_on_beyond(problems[nearest.problem].searched(), nearest.t)) {
       nearest.t = searched_from(nearest, true);
       finish(nearest);
+    }
+    if (!is_beyond(nearest.t)) continue;
+    // The choices were made on the sliders, or at few places beyond.
+    std::vector<Candidate> others;
+    for (std::size_t i = 0; i < problems.size(); ++i) {
+      if (i == nearest.problem || !same_numbers(problems[i].searched(), problems[nearest.problem].searched())) continue;
+      problems[i].set_numbers(nearest.t);
+      auto added = extra();
+      others.push_back({i, nearest.t, problems[i].solve(data.fine, added)});
+    }
+    std::ranges::stable_sort(others, {}, &Candidate::error);
+    if (others.size() > kOtherChoices) others.resize(kOtherChoices);
+    for (Candidate& c : others) {
+      c.t = searched_from(c, true);
+      finish(c);
     }
   }
   Problem& problem = problems[best_problem];

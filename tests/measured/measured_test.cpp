@@ -322,6 +322,7 @@ TEST(FitModels, NumbersAreFoundBeyondTheSliders) {
                           {{"cook_torrance", {"m=0.01", "f0=0.9,0.6,0.3"}}, "m", 0.01, false},
                           {{"ward", {"ax=0.01", "ay=0.01", "ks=0.5"}}, "ax", 0.01},
                           {{"microfacet", {"ax=0.012", "ay=0.012"}}, "ay", 0.012},
+                          {{"microfacet", {"ax=0.004", "ay=0.004", "distribution=ggx"}}, "ax", 0.004},
                           {{"blinn", {"e=1e4"}}, "e", 1e4}};
   for (const Narrow& c : cases) {
     std::vector<Part> parts{c.part};
