@@ -210,6 +210,9 @@ void add_measured_command(Command app) {
       fmt::print("  {:<22}{:>8.2f} %  {:>4.1f} s  {}{}\n", f.model->info().name, 100 * f.error, f.seconds,
                  format_values(f.model->info(), measured::rounded(f.values)),
                  (f.matte ? fmt::format(" and Lambert {:.4g},{:.4g},{:.4g}", f.matte->r, f.matte->g, f.matte->b) : "") +
+                     (measured::has_mirror(f)
+                          ? fmt::format("; its mirror, {} % of a white world, is not in the data", in_percent(f.mirror))
+                          : "") +
                      measured::remarks(f));
     if (const auto why = measured::order_of_fits(fits)) fmt::print("  {}\n", *why);
     if (o->lobes) print_sums(sums, *o->lobes);

@@ -581,11 +581,9 @@ std::optional<std::string> order_of_fits(const std::vector<ModelFit>& fits) {
 
 std::string remarks(const ModelFit& f) {
   std::string out;
-  if (has_mirror(f))
-    out += fmt::format("; its mirror, {} % of a white world, is not in the data", in_percent(f.mirror));
   if (!f.stopped.empty()) out += fmt::format("; stopped at the end of the range of {}", fmt::join(f.stopped, ", "));
   if (f.turned)
-    out += fmt::format("; {:.2f} % if the data were turned by {:.1f} degrees about the normal", 100 * f.turned->error,
+    out += fmt::format("; {} % if the data were turned by {:.1f} degrees about the normal", in_percent(f.turned->error),
                        f.turned->angle * 180 / kPi);
   return out;
 }

@@ -43,7 +43,7 @@ inline bool has_mirror(const ModelFit& f) { return f.mirror >= 5e-5; }
 /// The values to four digits, for people: a measurement has no more.
 ParamValues rounded(ParamValues);
 
-/// What is to be said of a fit beside its parameters; begins with "; " unless it is empty.
+/// What is to be said of the search beside the parameters that were found; begins with "; " unless it is empty.
 std::string remarks(const ModelFit&);
 
 /// Why fits stand before ones with smaller errors, in a sentence; nullopt if none does.
