@@ -46,6 +46,8 @@ Json describe(const measured::ModelFit& f) {
           {"matte", f.matte ? rgb(*f.matte) : Json()},
           {"error", f.error},
           {"mirror", f.mirror},
+          {"stopped", f.stopped},
+          {"turned", f.turned ? Json{{"angle", f.turned->angle}, {"error", f.turned->error}} : Json()},
           {"seconds", f.seconds}};
 }
 
@@ -210,7 +212,8 @@ void add_measured_command(Command app) {
                  (f.matte ? fmt::format(" and Lambert {:.4g},{:.4g},{:.4g}", f.matte->r, f.matte->g, f.matte->b) : "") +
                      (measured::has_mirror(f)
                           ? fmt::format("; its mirror, {} % of a white world, is not in the data", in_percent(f.mirror))
-                          : ""));
+                          : "") +
+                     measured::remarks(f));
     if (const auto why = measured::order_of_fits(fits)) fmt::print("  {}\n", *why);
     if (o->lobes) print_sums(sums, *o->lobes);
   });

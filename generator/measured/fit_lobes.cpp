@@ -21,6 +21,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr std::size_t kScoringPairs = 1024, kSearchPairs = 2048, kLastPairs = 8192;  ///< pairs of directions
+constexpr int kNarrowAtoms = 3;    ///< places where highlights that are narrower than those of the ranges are tried
 constexpr std::size_t kTried = 6;  ///< kinds of lobes whose numbers are searched before one is taken
 /// Searches begin anew, with smaller steps, where the one before ended, until that helps little.
 constexpr int kLeastSearches = 2, kMostSearches = 8;
@@ -73,8 +74,7 @@ struct Place {
 ParamValues values_at(const Place& place) {
   ParamValues out = place.kind->values;
   for (std::size_t i = 0; i < place.t.size(); ++i)
-    for (const std::string& name : place.kind->numbers[i].names)
-      out[name] = place.kind->numbers[i].range.at(place.t[i]);
+    for (const std::string& name : place.kind->numbers[i].names) out[name] = place.kind->numbers[i].at(place.t[i]);
   return out;
 }
 
@@ -129,6 +129,7 @@ class Fitter {
       if (is_curved(kind, coarse_.pairs)) curved_.push_back(&kind);
       std::vector<double> t(kind.numbers.size());
       add_atoms(kind, t, 0);
+      add_narrow_atoms(kind);
     }
     responses_.resize(atoms_.size());
     for_all(atoms_.size(),
@@ -200,6 +201,21 @@ class Fitter {
     }
   }
 
+  /// Beyond the ranges the numbers that have more are tried together.
+  void add_narrow_atoms(const LobeKind& kind) {
+    const auto beyond = [](const LobeKind::Number& n) { return n.first_place() < 0 || n.last_place() > 1; };
+    if (std::ranges::none_of(kind.numbers, beyond)) return;
+    for (int k = 0; k < kNarrowAtoms; ++k) {
+      const double share = (k + 0.5) / kNarrowAtoms;
+      std::vector<double> t;
+      for (const LobeKind::Number& n : kind.numbers)
+        t.push_back(!beyond(n)            ? 0.5
+                    : n.first_place() < 0 ? share * n.first_place()
+                                          : 1 + share * (n.last_place() - 1));
+      atoms_.push_back({&kind, std::move(t)});
+    }
+  }
+
   static Solution solved(const std::vector<const Response*>& responses, const Target& target, int rounds) {
     const Index count = target.data.rows(), n = Index(responses.size());
     Solution out{MatrixXd(n, 3), 0};
@@ -260,7 +276,10 @@ class Fitter {
     for (int search = 0; search < kMostSearches; ++search, step *= kStepFalls) {
       std::vector<fit::Variable> variables;
       for (std::size_t i = first; i < places.size(); ++i)
-        for (const double t : places[i].t) variables.push_back({t, 0, 1, step});
+        for (std::size_t d = 0; d < places[i].t.size(); ++d) {
+          const LobeKind::Number& number = places[i].kind->numbers[d];
+          variables.push_back({places[i].t[d], number.first_place(), number.last_place(), step});
+        }
       if (variables.empty()) break;
       const auto set = [&](const std::vector<double>& x) {
         std::size_t k = 0;

@@ -9,6 +9,7 @@
 
 #include "core/parallel.h"
 #include "core/sequence.h"
+#include "core/text.h"
 #include "fit/view.h"
 #include "measured/fit_factors.h"
 #include "measured/least_deviations.h"
@@ -28,19 +29,102 @@ constexpr double kGood = 1e-3;
 constexpr double kWorthMatte = 0.95;
 /// Errors that differ by no more than this share, or by this part of the light, are alike.
 constexpr double kModelsAlike = 0.05, kNegligible = 5e-4;
+/// Beyond the sliders, widths are searched for by so many times narrower or wider ones at most: no data resolve more.
+/// Exponents go as the inverse square of a width.
+constexpr double kBeyond = 100, kBeyondExponent = kBeyond * kBeyond;
+constexpr int kTriesBeyond = 4;  ///< places where narrower highlights than those of the sliders are tried
+/// A search begins there if they are so many times better than those on the sliders.
+constexpr double kWorthBeyond = 0.9;
+/// Where it ends beyond, so many other choices are searched from there.
+constexpr std::size_t kOtherChoices = 3;
+/// A search that ends as near to the end of a slider, as a share of it, goes on beyond.
+constexpr double kAtEnd = 0.03;
+/// Turned data are worth a word if the error is so many times smaller, and if it is larger than this without.
+constexpr double kWorthTurn = 0.9, kTurnFrom = 0.01;
+/// Turns by more than 45 degrees are told if the error is so many times smaller, and by kTurnFrom more, than with less.
+constexpr double kWorthFarther = 0.8;
+/// Axes that differ by less than this are the same, in radians: the estimate is not as exact.
+constexpr double kSameAxes = 0.02;
+
+/// Of the data: none if they are isotropic.
+enum class Axes { None, Aligned, Turned };
+
+/// Whether a number is an angle without ends.
+bool is_circle(const ParamInfo& p) { return p.unit == "rad" && p.soft_max - p.soft_min > 2 * kPi - 1e-6; }
+
+/// Where a number is searched for: places, of which 0 and 1 are the ends of its slider.
+class SearchRange {
+ public:
+  explicit SearchRange(const ParamInfo& p)
+      : info(&p), slider_(p.slider()), first_(scaled(slider_.low)), width_(scaled(slider_.high) - first_) {
+    double least = slider_.low, most = slider_.high;
+    switch (slider_.scale) {
+      case AxisScale::Log:
+        least = std::max(p.min, least / kBeyond), most = std::min(p.max, most * kBeyond);
+        break;
+      case AxisScale::Log1p:
+        most = std::min(p.max, most * kBeyondExponent);
+        break;
+      case AxisScale::Linear:
+        // More than the whole circle is the same again.
+        if (!is_circle(p)) least = std::max(p.min, least - width_), most = std::min(p.max, most + width_);
+    }
+    low = std::min(0., (scaled(least) - first_) / width_);
+    high = std::max(1., (scaled(most) - first_) / width_);
+  }
+
+  double at(double t) const {
+    if (t >= 0 && t <= 1) return slider_.at(t);
+    return std::clamp(from_scale(slider_.scale, first_ + t * width_), info->min, info->max);
+  }
+  /// The place on the slider of a value.
+  double place(double value) const {
+    return std::clamp((scaled(std::clamp(value, slider_.low, slider_.high)) - first_) / width_, 0., 1.);
+  }
+  /// The place at a share of the way from the slider's end to the narrowest highlight; nullopt if there is no way.
+  std::optional<double> narrower(double share) const {
+    if (slider_.scale == AxisScale::Log && low < 0) return share * low;
+    if (slider_.scale == AxisScale::Log1p && high > 1) return 1 + share * (high - 1);
+    return std::nullopt;
+  }
+  /// Whether a search ended where more might be better. The ends of shares and angles, and exponents of 0, are no such
+  /// places, unless the model accepts more.
+  bool stopped(double t) const {
+    constexpr double kNear = 1e-3;
+    const bool at_low = t<low + kNear, at_high = t> high - kNear;
+    if (is_circle(*info)) return false;
+    if (slider_.scale == AxisScale::Log) return at_low || at_high;
+    if (slider_.scale == AxisScale::Log1p) return at_high;
+    return (at_low && at(low) > info->min) || (at_high && at(high) < info->max);
+  }
+
+  const ParamInfo* info;
+  double low = 0, high = 1;  ///< the ends of the search
+
+ private:
+  double scaled(double x) const { return to_scale(slider_.scale, x); }
+
+  ScaledRange slider_;
+  double first_, width_;
+};
+
 /// A model with its choices made, and what is searched for.
 class Problem {
  public:
-  Problem(const Model& model, const ParamValues& choices, bool isotropic, const Pairs& pairs)
+  Problem(const Model& model, const ParamValues& choices, Axes axes, const Pairs& pairs)
       : info_(model.info()), values_(complete(info_, choices)), brdf_(model.make_double(values_)) {
     for (const ParamInfo& p : info_.params)
       if (p.kind == ParamKind::Color) colors_.push_back(&p);
     if (brdf_->scatters_through()) return;
     std::vector<const ParamInfo*> numbers;
-    // Isotropic data say nothing of an angle about the normal, which isotropic models do not have.
-    const bool turns_nothing = isotropic && !info_.properties.isotropic;
+    // Isotropic data say nothing of an angle about the normal, which isotropic models do not have. Where the data's
+    // axes are the tangent and the bitangent, no rotation is needed.
+    const auto turns_nothing = [&](const ParamInfo& p) {
+      if (p.unit != "rad" || info_.properties.isotropic) return false;
+      return axes == Axes::None || (axes == Axes::Aligned && is_circle(p));
+    };
     for (const ParamInfo& p : info_.params)
-      if (p.kind == ParamKind::Number && !(turns_nothing && p.unit == "rad")) numbers.push_back(&p);
+      if (p.kind == ParamKind::Number && !turns_nothing(p)) numbers.push_back(&p);
     for (const ParamInfo* p : numbers) {
       if (!matters(*p, numbers, pairs)) {
         without_mirror(*p);
@@ -50,17 +134,17 @@ class Problem {
       if (std::ranges::any_of(colors_, [&](const ParamInfo* c) { return p->max == 1 && same_at_zero(*p, *c, pairs); }))
         set(*p, 1);
       else
-        searched_.push_back(p);
+        searched_.emplace_back(*p);
     }
   }
 
   bool through() const { return brdf_->scatters_through(); }
-  const std::vector<const ParamInfo*>& searched() const { return searched_; }
+  const std::vector<SearchRange>& searched() const { return searched_; }
   const ParamValues& values() const { return values_; }
   int free() const { return int(searched_.size() + colors_.size()); }
 
   void set_numbers(const std::vector<double>& t) {
-    for (std::size_t i = 0; i < searched_.size(); ++i) set(*searched_[i], searched_[i]->slider().at(t[i]));
+    for (std::size_t i = 0; i < searched_.size(); ++i) set(*searched_[i].info, searched_[i].at(t[i]));
   }
 
   Colors eval(const Pairs& p) const {
@@ -199,8 +283,12 @@ class Problem {
         if (others >= 0) set(*numbers[i], numbers[i]->slider().at(wrap(others + 0.37 * double(i))));
       set(p, p.slider().at(0.25));
       const Colors low = eval(pairs);
-      set(p, p.slider().at(0.75));
-      found |= differ(low, eval(pairs));
+      // The halves of a circle may be alike.
+      for (const double place : {0.75, 0.6}) {
+        if (found) break;
+        set(p, p.slider().at(place));
+        found = differ(low, eval(pairs));
+      }
       for (const ParamInfo* q : numbers) set(*q, std::get<double>(before.at(q->name)));
     }
     return found;
@@ -227,69 +315,236 @@ class Problem {
   const ModelInfo& info_;
   ParamValues values_;
   std::unique_ptr<Brdf<double>> brdf_;
-  std::vector<const ParamInfo*> colors_, searched_;
+  std::vector<const ParamInfo*> colors_;
+  std::vector<SearchRange> searched_;
 };
 
 struct Candidate {
   std::size_t problem;
-  std::vector<double> t;  ///< places on the sliders
+  std::vector<double> t;  ///< places of the searched numbers
   double error;
 };
 
-double slider_place(const ParamInfo& p, double value) {
-  const ScaledRange r = p.slider();
-  const double low = to_scale(r.scale, r.low), high = to_scale(r.scale, r.high);
-  return std::clamp((to_scale(r.scale, std::clamp(value, r.low, r.high)) - low) / (high - low), 0., 1.);
+/// A place of each number, the k-th of a sequence that fills the sliders: an additive recurrence with powers of a root,
+/// as in core/sequence.h, for any number of dimensions.
+std::vector<double> place_of_try(std::size_t numbers, int k) {
+  std::vector<double> t(numbers);
+  for (std::size_t d = 0; d < numbers; ++d) t[d] = wrap(0.5 + double(k) * std::pow(1.22, -double(d + 1)) * 0.7548);
+  return t;
 }
 
-std::optional<ModelFit> fit_model(const Model& model, bool isotropic, const Pairs& coarse, const Pairs& fine,
-                                  const Pairs& last, Matte allowed) {
+/// Places with highlights that are narrower than those of the sliders: of each number, and of all of them, with the
+/// others as they are at `t`.
+std::vector<std::vector<double>> narrower_places(const std::vector<SearchRange>& searched,
+                                                 const std::vector<double>& t) {
+  std::vector<std::vector<double>> out;
+  for (int k = 1; k <= kTriesBeyond; ++k) {
+    std::vector<double> all = t;
+    std::size_t some = 0;
+    for (std::size_t d = 0; d < t.size(); ++d) {
+      const auto place = searched[d].narrower(double(k) / kTriesBeyond);
+      if (!place) continue;
+      out.push_back(t);
+      out.back()[d] = all[d] = *place;
+      ++some;
+    }
+    if (some > 1) out.push_back(std::move(all));
+  }
+  return out;
+}
+
+/// Searches from a place, on the sliders, and beyond those of whose ends the place is beyond or near.
+std::vector<double> search(Problem& problem, std::vector<double> t, bool from_ends,
+                           const std::function<double()>& error) {
+  const std::vector<SearchRange>& searched = problem.searched();
+  const double near = from_ends ? kAtEnd : 0;
+  std::vector<double> low(t.size(), 0), high(t.size(), 1);
+  for (std::size_t d = 0; d < t.size(); ++d) {
+    if (t[d] < near) low[d] = searched[d].low;
+    if (t[d] > 1 - near) high[d] = searched[d].high;
+  }
+  for (const double step : {0.08, 0.01}) {
+    if (t.empty()) break;
+    std::vector<fit::Variable> variables;
+    for (std::size_t d = 0; d < t.size(); ++d) variables.push_back({t[d], low[d], high[d], step});
+    t = fit::argmin(variables, [&](const std::vector<double>& x) {
+      problem.set_numbers(x);
+      return std::min(error(), 1e6);
+    });
+  }
+  return t;
+}
+
+bool goes_on_beyond(const std::vector<SearchRange>& searched, const std::vector<double>& t) {
+  for (std::size_t d = 0; d < t.size(); ++d) {
+    const bool at_low = t[d] >= 0 && t[d] < kAtEnd, at_high = t[d] <= 1 && t[d] > 1 - kAtEnd;
+    if ((at_low && searched[d].low < 0) || (at_high && searched[d].high > 1)) return true;
+  }
+  return false;
+}
+
+bool is_beyond(const std::vector<double>& t) {
+  return std::ranges::any_of(t, [](double place) { return place < 0 || place > 1; });
+}
+
+bool same_numbers(const std::vector<SearchRange>& a, const std::vector<SearchRange>& b) {
+  return std::ranges::equal(a, b, {}, &SearchRange::info, &SearchRange::info);
+}
+
+/// The pairs as a BRDF whose tangent is turned by an angle sees them.
+Pairs seen_turned(Pairs p, double angle) {
+  const double c = std::cos(angle), s = std::sin(angle);
+  for (auto* directions : {&p.wi, &p.wo})
+    for (Vec3<double>& w : *directions) w = rotate_z(w, c, s);
+  return p;
+}
+
+/// The direction in which the data's highlights are widest: the main axis of the half vectors, by the light.
+double axis_of(const Pairs& p) {
+  double cos2 = 0, sin2 = 0;
+  for (std::size_t k = 0; k < p.wi.size(); ++k) {
+    const Vec3<double> h = normalize(p.wi[k] + p.wo[k]);
+    const double light = p.weight[Eigen::Index(k)] * luminance(p.data[k]);
+    cos2 += light * (h.x * h.x - h.y * h.y);
+    sin2 += light * 2 * h.x * h.y;
+  }
+  return std::atan2(sin2, cos2) / 2;
+}
+
+/// What is compared: few pairs for tries, more for searches, most for the error that is told.
+struct Compared {
+  Pairs coarse, fine, last;
+  Axes axes;
+  double axis;  ///< see axis_of()
+};
+
+/// How close a problem comes if the data are turned about the normal, where the tangent is near an angle.
+ModelFit::Turned turned_near(Problem& problem, const Compared& data, bool matte, double angle) {
+  const auto error = [&](const std::vector<double>& t, const Pairs& pairs) {
+    problem.set_numbers(t);
+    std::optional<Rgb<double>> added;
+    if (matte) added = Rgb<double>(0);
+    return problem.solve(pairs, added);
+  };
+  const std::size_t n = problem.searched().size();
+  std::vector<double> best;
+  double least = std::numeric_limits<double>::infinity();
+  const Pairs coarse = seen_turned(data.coarse, angle);
+  for (int k = 1; k <= kTries * int(n); ++k) {
+    std::vector<double> t = place_of_try(n, k);
+    if (const double e = error(t, coarse); best.empty() || e < least) best = std::move(t), least = e;
+  }
+  best.push_back(angle);
+  for (const double step : {0.08, 0.01}) {
+    std::vector<fit::Variable> variables;
+    for (std::size_t d = 0; d < n; ++d) variables.push_back({best[d], 0, 1, step});
+    variables.push_back({best[n], best[n] - kPi / 4, best[n] + kPi / 4, 2 * step});
+    best = fit::argmin(variables, [&](const std::vector<double>& x) {
+      return std::min(error({x.begin(), x.end() - 1}, seen_turned(data.fine, x.back())), 1e6);
+    });
+  }
+  angle = best[n];
+  best.pop_back();
+  // The data have to be turned the other way. Half a turn changes nothing.
+  return {-std::remainder(angle, kPi), error(best, seen_turned(data.last, angle))};
+}
+
+/// The same for the data's axes. A model may be wide along either of its own.
+ModelFit::Turned turned_fit(Problem& problem, const Compared& data, bool matte) {
+  const double flat = std::remainder(data.axis, kPi / 2);
+  const ModelFit::Turned near = turned_near(problem, data, matte, flat);
+  const ModelFit::Turned far = turned_near(problem, data, matte, flat > 0 ? flat - kPi / 2 : flat + kPi / 2);
+  return far.error < kWorthFarther * near.error - kTurnFrom ? far : near;
+}
+
+std::optional<ModelFit> fit_model(const Model& model, const Compared& data, Matte allowed) {
   const auto start = std::chrono::steady_clock::now();
   const ModelInfo& info = model.info();
   std::vector<Problem> problems;
   for (const Choices& choices : choice_combinations(info)) {
-    Problem p(model, with_choices(info, choices), isotropic, coarse);
+    Problem p(model, with_choices(info, choices), data.axes, data.coarse);
     if (!p.through()) problems.push_back(std::move(p));
   }
   std::optional<ModelFit> best;
+  std::size_t best_problem = 0;
   for (const bool matte : {false, true}) {
     if (matte && (allowed == Matte::None || info.look == Look::Matte || best->error < kGood)) break;
     const auto extra = [&] { return matte ? std::optional(Rgb<double>(0)) : std::nullopt; };
-    std::vector<Candidate> candidates;
+    std::vector<Candidate> candidates, narrower;
     for (std::size_t i = 0; i < problems.size(); ++i) {
       Problem& problem = problems[i];
-      const std::size_t n = problem.searched().size();
-      std::vector<double> t;
-      for (const ParamInfo* p : problem.searched()) t.push_back(slider_place(*p, p->value[0]));
-      for (int k = 0; k <= (n ? kTries * int(n) : 0); ++k) {
+      const std::size_t n = problem.searched().size(), first = candidates.size();
+      const auto tried = [&](std::vector<double> t) {
         problem.set_numbers(t);
         auto added = extra();
-        candidates.push_back({i, t, problem.solve(coarse, added)});
-        // An additive recurrence with powers of a root, as in core/sequence.h, for any number of dimensions.
-        for (std::size_t d = 0; d < n; ++d) t[d] = wrap(0.5 + double(k + 1) * std::pow(1.22, -double(d + 1)) * 0.7548);
-      }
+        const double error = problem.solve(data.coarse, added);
+        return Candidate{i, std::move(t), error};
+      };
+      std::vector<double> defaults;
+      for (const SearchRange& r : problem.searched()) defaults.push_back(r.place(r.info->value[0]));
+      candidates.push_back(tried(std::move(defaults)));
+      for (int k = 1; k <= kTries * int(n); ++k) candidates.push_back(tried(place_of_try(n, k)));
+      const auto nearest =
+          std::ranges::min_element(candidates.begin() + long(first), candidates.end(), {}, &Candidate::error);
+      for (std::vector<double>& t : narrower_places(problem.searched(), nearest->t))
+        narrower.push_back(tried(std::move(t)));
     }
     std::ranges::stable_sort(candidates, {}, &Candidate::error);
     if (candidates.size() > kModelStarts) candidates.resize(kModelStarts);
-    for (Candidate& c : candidates) {
+    // One more, which takes no other's place: those beyond are near one another.
+    const auto narrow = std::ranges::min_element(narrower, {}, &Candidate::error);
+    if (narrow != narrower.end() && narrow->error < kWorthBeyond * candidates.front().error)
+      candidates.push_back(*narrow);
+    const auto finish = [&](Candidate& c) {
       Problem& problem = problems[c.problem];
-      for (const double step : {0.08, 0.01}) {
-        if (c.t.empty()) break;
-        std::vector<fit::Variable> variables;
-        for (const double t : c.t) variables.push_back({t, 0, 1, step});
-        c.t = fit::argmin(variables, [&](const std::vector<double>& t) {
-          problem.set_numbers(t);
-          auto added = extra();
-          return std::min(problem.solve(fine, added), 1e6);
-        });
-      }
       problem.set_numbers(c.t);
       auto added = extra();
-      const double error = problem.solve(last, added);
-      if (!best || error < best->error * (matte && !best->matte ? kWorthMatte : 1 - 1e-3))
-        best = ModelFit{&model, problem.values(), added, error, problem.mirror(), problem.free() + int(matte), 0};
+      c.error = problem.solve(data.last, added);
+      if (best && !(c.error < best->error * (matte && !best->matte ? kWorthMatte : 1 - 1e-3))) return;
+      best = ModelFit{&model, problem.values(), added, c.error, problem.mirror(), problem.free() + int(matte), 0};
+      for (std::size_t d = 0; d < c.t.size(); ++d)
+        if (problem.searched()[d].stopped(c.t[d])) best->stopped.push_back(problem.searched()[d].info->name);
+      best_problem = c.problem;
+    };
+    const auto searched_from = [&](const Candidate& c, bool from_ends) {
+      Problem& problem = problems[c.problem];
+      return search(problem, c.t, from_ends, [&] {
+        auto added = extra();
+        return problem.solve(data.fine, added);
+      });
+    };
+    for (Candidate& c : candidates) {
+      c.t = searched_from(c, false);
+      finish(c);
     }
     if (!best) return std::nullopt;
+    Candidate nearest = *std::ranges::min_element(candidates, {}, &Candidate::error);
+    if (goes_on_beyond(problems[nearest.problem].searched(), nearest.t)) {
+      nearest.t = searched_from(nearest, true);
+      finish(nearest);
+    }
+    if (!is_beyond(nearest.t)) continue;
+    // The choices were made on the sliders, or at few places beyond.
+    std::vector<Candidate> others;
+    for (std::size_t i = 0; i < problems.size(); ++i) {
+      if (i == nearest.problem || !same_numbers(problems[i].searched(), problems[nearest.problem].searched())) continue;
+      problems[i].set_numbers(nearest.t);
+      auto added = extra();
+      others.push_back({i, nearest.t, problems[i].solve(data.fine, added)});
+    }
+    std::ranges::stable_sort(others, {}, &Candidate::error);
+    if (others.size() > kOtherChoices) others.resize(kOtherChoices);
+    for (Candidate& c : others) {
+      c.t = searched_from(c, true);
+      finish(c);
+    }
+  }
+  Problem& problem = problems[best_problem];
+  const bool turns = std::ranges::any_of(problem.searched(), [](const SearchRange& r) { return is_circle(*r.info); });
+  if (data.axes == Axes::Turned && !info.properties.isotropic && !turns && best->error > kTurnFrom &&
+      !problem.searched().empty()) {
+    const ModelFit::Turned turned = turned_fit(problem, data, best->matte.has_value());
+    if (turned.error < kWorthTurn * best->error) best->turned = turned;
   }
   best->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return best;
@@ -324,20 +579,32 @@ std::optional<std::string> order_of_fits(const std::vector<ModelFit>& fits) {
   return fmt::to_string(fmt::join(why, "; "));
 }
 
+std::string remarks(const ModelFit& f) {
+  std::string out;
+  if (!f.stopped.empty()) out += fmt::format("; stopped at the end of the range of {}", fmt::join(f.stopped, ", "));
+  if (f.turned)
+    out += fmt::format("; {} % if the data were turned by {:.1f} degrees about the normal", in_percent(f.turned->error),
+                       f.turned->angle * 180 / kPi);
+  return out;
+}
+
 std::vector<ModelFit> fit_models(const Measurement& m, const MeasuredModel& data,
                                  const std::vector<const Model*>& models, Matte matte,
                                  const std::function<void(const Model&, std::size_t done)>& progress) {
   if (models.empty()) return {};
   require_enough_to_fit(m);
-  const Pairs coarse = make_pairs(data, kCoarse, 1), fine = make_pairs(data, kFine, 2),
-              last = make_pairs(data, kFinal, 3);
+  Compared all{make_pairs(data, kCoarse, 1), make_pairs(data, kFine, 2), make_pairs(data, kFinal, 3), Axes::None, 0};
+  if (!m.isotropic) {
+    all.axis = axis_of(all.last);
+    all.axes = std::abs(std::remainder(all.axis, kPi / 2)) < kSameAxes ? Axes::Aligned : Axes::Turned;
+  }
   std::vector<std::optional<ModelFit>> found(models.size());
   std::atomic<std::size_t> done{0};
   for_all(models.size(), [&](std::size_t i) {
     if (const auto curves = curve_roles(*models[i]))
-      found[i] = fit_factors(*models[i], *curves, m.isotropic, fine, make_pairs(data, kCurves, 4), last);
+      found[i] = fit_factors(*models[i], *curves, m.isotropic, all.fine, make_pairs(data, kCurves, 4), all.last);
     else if (models[i]->has_scatter())
-      found[i] = fit_model(*models[i], m.isotropic, coarse, fine, last, matte);
+      found[i] = fit_model(*models[i], all, matte);
     if (progress) progress(*models[i], ++done);
   });
   std::vector<ModelFit> out;

@@ -26,6 +26,15 @@ struct ModelFit {
   double mirror = 0;
   int found = 0;  ///< number of parameters that were fitted
   double seconds = 0;
+  /// Numbers whose search ended at the end of what the model accepts, or of what data resolve.
+  std::vector<std::string> stopped = {};
+  /// How close an anisotropic model without an angle of its own comes once the data are turned about the normal,
+  /// counted from x to y, if that is much closer.
+  struct Turned {
+    double angle = 0;  ///< radians
+    double error = 0;
+  };
+  std::optional<Turned> turned = {};
 };
 
 /// Whether a fitted model has a mirror whose light is worth a word: less than 0.005 % is not.
@@ -33,6 +42,9 @@ inline bool has_mirror(const ModelFit& f) { return f.mirror >= 5e-5; }
 
 /// The values to four digits, for people: a measurement has no more.
 ParamValues rounded(ParamValues);
+
+/// What is to be said of the search beside the parameters that were found; begins with "; " unless it is empty.
+std::string remarks(const ModelFit&);
 
 /// Why fits stand before ones with smaller errors, in a sentence; nullopt if none does.
 std::optional<std::string> order_of_fits(const std::vector<ModelFit>&);

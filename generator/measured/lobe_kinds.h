@@ -2,6 +2,8 @@
 // The lobes of which sums are made: models with all choices made and one colour, over ranges of their numbers.
 #pragma once
 
+#include <algorithm>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +17,15 @@ struct LobeKind {
     std::vector<std::string> names;  ///< parameters that have one value
     ScaledRange range;
     int places;  ///< where it is tried before a search
+    /// Where a search for narrower highlights ends, beyond the range; nullopt if it ends with the range.
+    std::optional<double> narrowest = {};
+
+    /// The value at a place, of which 0 and 1 are the ends of the range.
+    double at(double t) const;
+    /// The places between which a search takes place.
+    double first_place() const { return std::min(0., narrowest ? place(*narrowest) : 0.); }
+    double last_place() const { return std::max(1., narrowest ? place(*narrowest) : 1.); }
+    double place(double value) const;
   };
   const Model* model;
   ParamValues values;  ///< complete

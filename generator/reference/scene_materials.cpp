@@ -245,11 +245,11 @@ class MaterialReader {
       const Model& lambert = find_model("lambert");
       const ParamValues rho{{"rho", std::array<double, 3>{fit.matte->r, fit.matte->g, fit.matte->b}}};
       misplaces(info.name + " with lambert", fit.error,
-                described(info, fit.values) + " + " + described(lambert.info(), rho));
+                described(info, fit.values) + " + " + described(lambert.info(), rho) + measured::remarks(fit));
       set_stack({{fit.model, fit.values}, {&lambert, rho}}, measured::Stack::Sum, material, resolved);
       return;
     }
-    misplaces(info.name, fit.error, described(info, fit.values));
+    misplaces(info.name, fit.error, described(info, fit.values) + measured::remarks(fit));
     material.model = fit.model;
     material.values = fit.values;
     resolved = {{"model", info.name}, {"parameters", to_json(fit.values)}, {"representation", material.representation}};

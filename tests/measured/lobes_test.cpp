@@ -53,6 +53,16 @@ TEST(LeastDeviations, ColumnsThatAreNearlyAlikeAreToldApart) {
   EXPECT_NEAR(x[1], 0.6, 1e-3);
 }
 
+TEST(FitLobes, HighlightsMayBeNarrow) {
+  for (const char* alpha : {"0.008", "0.004"}) {
+    const std::string along = std::string("ax=") + alpha, across = std::string("ay=") + alpha;
+    const auto sums =
+        fitted({{"microfacet", {along, across}}, {"lambert", {"rho=0.06"}}}, 2, {"lambert", "microfacet"});
+    ASSERT_EQ(sums.size(), 2u) << alpha;
+    EXPECT_LT(sums.back().error, 0.02) << alpha;
+  }
+}
+
 struct Known {
   const char* name;
   std::vector<Part> parts;

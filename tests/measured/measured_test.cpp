@@ -11,6 +11,7 @@
 #include "measured/grid_table.h"
 #include "measured/measured_model.h"
 #include "measured/merl.h"
+#include "measured/sum_table.h"
 #include "model/sampling.h"
 #include "support.h"
 
@@ -307,6 +308,76 @@ TEST(FitModels, MatteLightIsAddedWhereAModelHasNone) {
   const ModelFit alone = fit_of(m, "blinn", Matte::None);
   EXPECT_FALSE(alone.matte);
   EXPECT_GT(alone.error, 0.1);
+}
+
+// What is accepted goes on beyond the sliders.
+TEST(FitModels, NumbersAreFoundBeyondTheSliders) {
+  struct Narrow {
+    Part part;
+    const char* name;
+    double value;
+    bool matte = true;
+  };
+  const Narrow cases[] = {{{"cook_torrance", {"m=0.03", "f0=0.9,0.6,0.3"}}, "m", 0.03, false},
+                          {{"cook_torrance", {"m=0.01", "f0=0.9,0.6,0.3"}}, "m", 0.01, false},
+                          {{"ward", {"ax=0.01", "ay=0.01", "ks=0.5"}}, "ax", 0.01},
+                          {{"microfacet", {"ax=0.012", "ay=0.012"}}, "ay", 0.012},
+                          {{"microfacet", {"ax=0.004", "ay=0.004", "distribution=ggx"}}, "ax", 0.004},
+                          {{"blinn", {"e=1e4"}}, "e", 1e4}};
+  for (const Narrow& c : cases) {
+    std::vector<Part> parts{c.part};
+    if (c.matte) parts.push_back({"lambert", {"rho=0.06"}});
+    const ModelFit fit = fit_of(as_measured(std::make_shared<SumTable>(parts)), c.part.model);
+    EXPECT_LT(fit.error, 0.02) << c.part.model;
+    EXPECT_NEAR(std::get<double>(fit.values.at(c.name)), c.value, 0.05 * c.value) << c.part.model;
+    EXPECT_TRUE(fit.stopped.empty()) << c.part.model;
+  }
+}
+
+TEST(FitModels, ANumberAtTheEndOfItsRangeIsNamed) {
+  // Facets that face everywhere are wider than any slope of 1 makes them.
+  const Part part{"microfacet", {"ax=1", "ay=1", "distribution=ggx"}};
+  const ModelFit fit = fit_of(as_measured(std::make_shared<SumTable>(std::vector{part})), "cook_torrance");
+  EXPECT_EQ(fit.stopped, std::vector<std::string>{"m"}) << std::get<double>(fit.values.at("m"));
+  EXPECT_NE(remarks(fit).find("; stopped at the end of the range of m"), std::string::npos);
+}
+
+/// A table turned about the normal.
+class TurnedTable final : public Table {
+ public:
+  TurnedTable(std::shared_ptr<const Table> table, double angle) : table_(std::move(table)), angle_(angle) {}
+  Rgb<double> eval(const Vec3<double>& wi, const Vec3<double>& wo) const override {
+    const double c = std::cos(angle_), s = std::sin(angle_);
+    return table_->eval(rotate_z(wi, c, s), rotate_z(wo, c, s));
+  }
+
+ private:
+  std::shared_ptr<const Table> table_;
+  double angle_;
+};
+
+TEST(FitModels, TheRotationOfAnisotropicDataIsFound) {
+  const Part part{"ashikhmin_shirley", {"rs=0.2", "rd=0.1", "nu=85", "nv=6", "rotation=0.5"}};
+  const ModelFit fit = fit_of(as_measured(std::make_shared<SumTable>(std::vector{part}), false), part.model);
+  EXPECT_LT(fit.error, 0.01);
+  // nu and nv may have changed places.
+  EXPECT_NEAR(std::remainder(std::get<double>(fit.values.at("rotation")) - 0.5, kPi / 2), 0, 0.01);
+}
+
+TEST(FitModels, ModelsWithoutARotationSayHowTheDataHaveToBeTurned) {
+  for (const double degrees : {0., 30., -60., 90.}) {
+    const auto straight = std::make_shared<SumTable>(
+        std::vector<Part>{{"ward", {"ax=0.1", "ay=0.4", "ks=0.5"}}, {"lambert", {"rho=0.1"}}});
+    const auto table = std::make_shared<TurnedTable>(straight, degrees * kPi / 180);
+    const ModelFit fit = fit_of(as_measured(table, false), "ward");
+    const bool aligned = degrees == 0 || degrees == 90;
+    EXPECT_EQ(fit.turned.has_value(), !aligned) << degrees << " " << fit.error;
+    if (!fit.turned) continue;
+    EXPECT_LT(fit.turned->error, 0.02) << degrees;
+    EXPECT_LE(std::abs(fit.turned->angle), kPi / 4) << degrees << " " << fit.turned->error;
+    EXPECT_NEAR(std::remainder(fit.turned->angle * 180 / kPi + degrees, 90), 0, 1) << degrees;
+    EXPECT_NE(remarks(fit).find("degrees about the normal"), std::string::npos);
+  }
 }
 
 // Phong's material has a lobe like this among others.
