@@ -64,16 +64,17 @@ def _decoded(w, shape, cones):
 def _seen_group(parts, cones):
     """The group that computes the cones of directions towards a slot's lamp."""
     vectors = (*SLOT, "at", "view", "true")
+    parts_of_seen = ("axes", "lit", "cone")
 
     def fill(w, found):
         here = parts.on(w, found)
         known = found | _decoded(w, found["shape"], cones)
-        known |= here.add("axes", **known)
-        known |= here.add("cone", **known)
+        for part in parts_of_seen:
+            known |= here.add(part, **known)
         return {name: known[name] for name, _ in outputs}
 
     outputs = _SEEN + _CODED + _AXES
-    content = ["seen", slots.CODE, cones, [parts.data[name] for name in ("axes", "cone")]]
+    content = ["seen", slots.CODE, cones, [parts.data[name] for name in parts_of_seen]]
     inputs = [[name, "VECTOR"] for name in vectors]
     return make_group("lamp seen", content, inputs, outputs, fill)
 
@@ -212,7 +213,7 @@ def _keep_apart(w, parts, lamps, at, widest):
     share; sets _DECIDED of each lamp."""
     kinds = {name: kind for name, kind in [*_SEEN, *_CODED, *_AXES]}
     kinds |= dict.fromkeys(SLOT, "VECTOR")
-    of_lamp = [*_BOUNDS, *parts.inputs("aside")]
+    of_lamp = [*_BOUNDS, *parts.inputs("lit"), *parts.inputs("aside")]
     taken = [name for name in dict.fromkeys(of_lamp) if name in kinds]
 
     def sockets(names):
@@ -229,7 +230,8 @@ def _keep_apart(w, parts, lamps, at, widest):
             f"lamp {i} {name}": lamp[name] for i, lamp in enumerate(of_lamps) for name in _DECIDED
         }
 
-    content = ["lamps apart", len(lamps), widest, taken, parts.data["aside"]]
+    used = [parts.data[name] for name in ("lit", "aside")]
+    content = ["lamps apart", len(lamps), widest, taken, used]
     inputs = [["at", "VECTOR"], *sockets(taken)]
     group = make_group("lamps apart", content, inputs, sockets(_DECIDED), fill)
     given = {f"lamp {i} {name}": lamp[name] for i, lamp in enumerate(lamps) for name in taken}
@@ -282,6 +284,7 @@ def _move_aside(w, parts, lamp, at, later):
     has_later = w.math("LESS_THAN", later["room"], _FAR - 0.1)
     alone = w.math("LESS_THAN", lamp["reach"], later["others"])
     other = {"other": later["nearest"], "other_radius": later["radius"]}
+    other |= parts.add("lit", at=at, **lamp)
     made = parts.add("aside", at=at, **lamp, **other)
     aside = w.math("MULTIPLY", lamp["flat"], has_later)
     for condition in (overlaps, alone, made["fits"]):

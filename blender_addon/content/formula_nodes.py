@@ -253,7 +253,8 @@ def _rest(w, parts, surface, given, lamps, narrow):
         here = {"at": surface.place, "ray": ray}
         here |= parts.add("density", **given | {"wi": drawn["wi"]})
     for lamp in reversed(lamps):
-        inside = parts.add("met", **here | lamp)["met"]
+        seen = here | lamp
+        inside = parts.add("met", **seen | parts.add("lit", **seen))["met"]
         met = w.math("MAXIMUM", met, w.math("MULTIPLY", inside, lamp["shown"]))
     lost = w.math("MAXIMUM", hidden, met)
     chance = w.math("FRACT", w.math("MULTIPLY", given["u_0"], 4096.0))

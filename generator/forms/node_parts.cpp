@@ -37,9 +37,8 @@ LampAxes<Expr> axes_input() {
 }
 
 LitArea<Expr> lit_input() {
-  return {input3("lit_place"), Expr::input("lit_across"), Expr::input("lit_along"), Expr(1.0)};
+  return {input3("lit_place"), Expr::input("lit_across"), Expr::input("lit_along"), Expr::input("is_lit")};
 }
-LitArea<Expr> lit_here() { return lit_area(slot_input(), axes_input(), input3("at")); }
 
 LampPart<Expr> part_input() { return {Expr::input("index"), Expr::input("side_across"), Expr::input("side_along")}; }
 void take_part(LampCone<Expr>& cone) {
@@ -91,7 +90,7 @@ NodeProgram record_axes() {
 }
 NodeProgram record_cone() {
   return recorded([](Program& p) {
-    const LitArea<Expr> lit = lit_here();
+    const LitArea<Expr> lit = lit_input();
     const LampCone<Expr> cone =
         cone_of(lit.of(slot_input()), lit.of(axes_input()), input3("at"), input3("view"), input3("true"));
     p.output("towards", cone.towards);
@@ -114,10 +113,11 @@ NodeProgram record_cone() {
 }
 NodeProgram record_lit() {
   return recorded([](Program& p) {
-    const LitArea<Expr> lit = lit_here();
+    const LitArea<Expr> lit = lit_area(slot_input(), axes_input(), input3("at"));
     p.output("lit_place", lit.place);
     p.output("lit_across", lit.half_across);
     p.output("lit_along", lit.half_along);
+    p.output("is_lit", lit.is_lit);
   });
 }
 NodeProgram record_count() {
@@ -140,7 +140,7 @@ NodeProgram record_cone_at() {
 }
 NodeProgram record_aside() {
   return recorded([](Program& p) {
-    const LitArea<Expr> lit = lit_here();
+    const LitArea<Expr> lit = lit_input();
     const ConeAside<Expr> aside =
         cone_aside(lit.of(slot_input()), lit.of(axes_input()), input3("at"), input3("towards"), Expr::input("inner"),
                    input3("other"), Expr::input("other_radius"));
@@ -173,7 +173,7 @@ NodeProgram record_met() {
     cone.of_cones = Expr::input("of_cones");
     cone.drop = Expr::input("drop");
     take_part(cone);
-    const LitArea<Expr> lit = lit_here();
+    const LitArea<Expr> lit = lit_input();
     p.output("met", met_part(lit.of(slot_input()), lit.of(axes_input()), input3("at"), cone, input3("ray"),
                              Expr::input("density")));
   });
