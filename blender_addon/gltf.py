@@ -7,18 +7,20 @@ material."""
 from .groups import model_nodes
 from .packs.pack import PackError
 from .plotting import nearest_node
+from .trees import shader_trees
 
 
 class glTF2ExportUserExtension:  # the exporter looks for this name
     """The exporter makes one for each file, and logs what its methods raise."""
 
     def gather_material_hook(self, gltf2_material, blender_material, export_settings):
-        """Fills in what the exporter has found no Principled node for."""
-        ours = model_nodes.shown_nodes(blender_material) if blender_material else []
-        if len(ours) != 1:
+        """Fills in a material that is a model's node alone. In others the exporter may have found a
+        Principled node, as below a coat."""
+        shown = [s.node for s in shader_trees.shown(blender_material)] if blender_material else []
+        if len(shown) != 1 or not model_nodes.is_ours(shown[0]):
             return
         try:
-            near = nearest_node.of_node(ours[0])
+            near = nearest_node.of_node(shown[0])
         except (ValueError, PackError):  # of another version, without this model
             return
         if near is not None:
