@@ -74,7 +74,8 @@ struct Place {
 ParamValues values_at(const Place& place) {
   ParamValues out = place.kind->values;
   for (std::size_t i = 0; i < place.t.size(); ++i)
-    for (const std::string& name : place.kind->numbers[i].names) out[name] = place.kind->numbers[i].at(place.t[i]);
+    for (const std::string& name : place.kind->numbers[i].names)
+      out[name] = place.kind->numbers[i].search.at(place.t[i]);
   return out;
 }
 
@@ -203,15 +204,12 @@ class Fitter {
 
   /// Beyond the ranges the numbers that have more are tried together.
   void add_narrow_atoms(const LobeKind& kind) {
-    const auto beyond = [](const LobeKind::Number& n) { return n.first_place() < 0 || n.last_place() > 1; };
-    if (std::ranges::none_of(kind.numbers, beyond)) return;
+    if (std::ranges::none_of(kind.numbers, [](const LobeKind::Number& n) { return n.search.narrower(1).has_value(); }))
+      return;
     for (int k = 0; k < kNarrowAtoms; ++k) {
-      const double share = (k + 0.5) / kNarrowAtoms;
       std::vector<double> t;
       for (const LobeKind::Number& n : kind.numbers)
-        t.push_back(!beyond(n)            ? 0.5
-                    : n.first_place() < 0 ? share * n.first_place()
-                                          : 1 + share * (n.last_place() - 1));
+        t.push_back(n.search.narrower((k + 0.5) / kNarrowAtoms).value_or(0.5));
       atoms_.push_back({&kind, std::move(t)});
     }
   }
@@ -277,8 +275,8 @@ class Fitter {
       std::vector<fit::Variable> variables;
       for (std::size_t i = first; i < places.size(); ++i)
         for (std::size_t d = 0; d < places[i].t.size(); ++d) {
-          const LobeKind::Number& number = places[i].kind->numbers[d];
-          variables.push_back({places[i].t[d], number.first_place(), number.last_place(), step});
+          const SearchRange& range = places[i].kind->numbers[d].search;
+          variables.push_back({places[i].t[d], range.first(), range.last(), step});
         }
       if (variables.empty()) break;
       const auto set = [&](const std::vector<double>& x) {

@@ -14,6 +14,7 @@
 #include "measured/fit_factors.h"
 #include "measured/least_deviations.h"
 #include "measured/pairs.h"
+#include "measured/search_range.h"
 #include "model/choices.h"
 
 namespace brdfc::measured {
@@ -29,9 +30,6 @@ constexpr double kGood = 1e-3;
 constexpr double kWorthMatte = 0.95;
 /// Errors that differ by no more than this share, or by this part of the light, are alike.
 constexpr double kModelsAlike = 0.05, kNegligible = 5e-4;
-/// Beyond the sliders, widths are searched for by so many times narrower or wider ones at most: no data resolve more.
-/// Exponents go as the inverse square of a width.
-constexpr double kBeyond = 100, kBeyondExponent = kBeyond * kBeyond;
 constexpr int kTriesBeyond = 4;  ///< places where narrower highlights than those of the sliders are tried
 /// A search begins there if they are so many times better than those on the sliders.
 constexpr double kWorthBeyond = 0.9;
@@ -52,60 +50,45 @@ enum class Axes { None, Aligned, Turned };
 /// Whether a number is an angle without ends.
 bool is_circle(const ParamInfo& p) { return p.unit == "rad" && p.soft_max - p.soft_min > 2 * kPi - 1e-6; }
 
-/// Where a number is searched for: places, of which 0 and 1 are the ends of its slider.
-class SearchRange {
- public:
-  explicit SearchRange(const ParamInfo& p)
-      : info(&p), slider_(p.slider()), first_(scaled(slider_.low)), width_(scaled(slider_.high) - first_) {
-    double least = slider_.low, most = slider_.high;
-    switch (slider_.scale) {
-      case AxisScale::Log:
-        least = std::max(p.min, least / kBeyond), most = std::min(p.max, most * kBeyond);
-        break;
-      case AxisScale::Log1p:
-        most = std::min(p.max, most * kBeyondExponent);
-        break;
-      case AxisScale::Linear:
-        // More than the whole circle is the same again.
-        if (!is_circle(p)) least = std::max(p.min, least - width_), most = std::min(p.max, most + width_);
-    }
-    low = std::min(0., (scaled(least) - first_) / width_);
-    high = std::max(1., (scaled(most) - first_) / width_);
-  }
+/// A number that is searched for, on its slider and beyond.
+struct Searched {
+  explicit Searched(const ParamInfo& p) : info(&p), scale(p.slider().scale), range(range_of(p)) {}
 
-  double at(double t) const {
-    if (t >= 0 && t <= 1) return slider_.at(t);
-    return std::clamp(from_scale(slider_.scale, first_ + t * width_), info->min, info->max);
-  }
-  /// The place on the slider of a value.
-  double place(double value) const {
-    return std::clamp((scaled(std::clamp(value, slider_.low, slider_.high)) - first_) / width_, 0., 1.);
-  }
-  /// The place at a share of the way from the slider's end to the narrowest highlight; nullopt if there is no way.
-  std::optional<double> narrower(double share) const {
-    if (slider_.scale == AxisScale::Log && low < 0) return share * low;
-    if (slider_.scale == AxisScale::Log1p && high > 1) return 1 + share * (high - 1);
-    return std::nullopt;
-  }
+  /// The place on the slider of the default.
+  double default_place() const { return std::clamp(range.place(info->value[0]), 0., 1.); }
   /// Whether a search ended where more might be better. The ends of shares and angles, and exponents of 0, are no such
   /// places, unless the model accepts more.
   bool stopped(double t) const {
     constexpr double kNear = 1e-3;
-    const bool at_low = t<low + kNear, at_high = t> high - kNear;
+    const double first = range.first(), last = range.last();
+    const bool at_first = t - first < kNear, at_last = last - t < kNear;
     if (is_circle(*info)) return false;
-    if (slider_.scale == AxisScale::Log) return at_low || at_high;
-    if (slider_.scale == AxisScale::Log1p) return at_high;
-    return (at_low && at(low) > info->min) || (at_high && at(high) < info->max);
+    if (scale == AxisScale::Log) return at_first || at_last;
+    if (scale == AxisScale::Log1p) return at_last;
+    return (at_first && range.at(first) > info->min) || (at_last && range.at(last) < info->max);
   }
 
   const ParamInfo* info;
-  double low = 0, high = 1;  ///< the ends of the search
+  AxisScale scale;
+  SearchRange range;
 
  private:
-  double scaled(double x) const { return to_scale(slider_.scale, x); }
-
-  ScaledRange slider_;
-  double first_, width_;
+  static SearchRange range_of(const ParamInfo& p) {
+    const ScaledRange slider = p.slider();
+    double least = slider.low, most = slider.high;
+    switch (slider.scale) {
+      case AxisScale::Log:
+        least /= kBeyond, most *= kBeyond;
+        break;
+      case AxisScale::Log1p:
+        most *= kBeyondExponent;
+        break;
+      case AxisScale::Linear:
+        // More than the whole circle is the same again.
+        if (const double width = most - least; !is_circle(p)) least -= width, most += width;
+    }
+    return {slider, std::max(p.min, least), std::min(p.max, most)};
+  }
 };
 
 /// A model with its choices made, and what is searched for.
@@ -139,12 +122,12 @@ class Problem {
   }
 
   bool through() const { return brdf_->scatters_through(); }
-  const std::vector<SearchRange>& searched() const { return searched_; }
+  const std::vector<Searched>& searched() const { return searched_; }
   const ParamValues& values() const { return values_; }
   int free() const { return int(searched_.size() + colors_.size()); }
 
   void set_numbers(const std::vector<double>& t) {
-    for (std::size_t i = 0; i < searched_.size(); ++i) set(*searched_[i].info, searched_[i].at(t[i]));
+    for (std::size_t i = 0; i < searched_.size(); ++i) set(*searched_[i].info, searched_[i].range.at(t[i]));
   }
 
   Colors eval(const Pairs& p) const {
@@ -316,7 +299,7 @@ class Problem {
   ParamValues values_;
   std::unique_ptr<Brdf<double>> brdf_;
   std::vector<const ParamInfo*> colors_;
-  std::vector<SearchRange> searched_;
+  std::vector<Searched> searched_;
 };
 
 struct Candidate {
@@ -335,14 +318,13 @@ std::vector<double> place_of_try(std::size_t numbers, int k) {
 
 /// Places with highlights that are narrower than those of the sliders: of each number, and of all of them, with the
 /// others as they are at `t`.
-std::vector<std::vector<double>> narrower_places(const std::vector<SearchRange>& searched,
-                                                 const std::vector<double>& t) {
+std::vector<std::vector<double>> narrower_places(const std::vector<Searched>& searched, const std::vector<double>& t) {
   std::vector<std::vector<double>> out;
   for (int k = 1; k <= kTriesBeyond; ++k) {
     std::vector<double> all = t;
     std::size_t some = 0;
     for (std::size_t d = 0; d < t.size(); ++d) {
-      const auto place = searched[d].narrower(double(k) / kTriesBeyond);
+      const auto place = searched[d].range.narrower(double(k) / kTriesBeyond);
       if (!place) continue;
       out.push_back(t);
       out.back()[d] = all[d] = *place;
@@ -356,12 +338,12 @@ std::vector<std::vector<double>> narrower_places(const std::vector<SearchRange>&
 /// Searches from a place, on the sliders, and beyond those of whose ends the place is beyond or near.
 std::vector<double> search(Problem& problem, std::vector<double> t, bool from_ends,
                            const std::function<double()>& error) {
-  const std::vector<SearchRange>& searched = problem.searched();
+  const std::vector<Searched>& searched = problem.searched();
   const double near = from_ends ? kAtEnd : 0;
   std::vector<double> low(t.size(), 0), high(t.size(), 1);
   for (std::size_t d = 0; d < t.size(); ++d) {
-    if (t[d] < near) low[d] = searched[d].low;
-    if (t[d] > 1 - near) high[d] = searched[d].high;
+    if (t[d] < near) low[d] = searched[d].range.first();
+    if (t[d] > 1 - near) high[d] = searched[d].range.last();
   }
   for (const double step : {0.08, 0.01}) {
     if (t.empty()) break;
@@ -375,10 +357,10 @@ std::vector<double> search(Problem& problem, std::vector<double> t, bool from_en
   return t;
 }
 
-bool goes_on_beyond(const std::vector<SearchRange>& searched, const std::vector<double>& t) {
+bool goes_on_beyond(const std::vector<Searched>& searched, const std::vector<double>& t) {
   for (std::size_t d = 0; d < t.size(); ++d) {
     const bool at_low = t[d] >= 0 && t[d] < kAtEnd, at_high = t[d] <= 1 && t[d] > 1 - kAtEnd;
-    if ((at_low && searched[d].low < 0) || (at_high && searched[d].high > 1)) return true;
+    if ((at_low && searched[d].range.first() < 0) || (at_high && searched[d].range.last() > 1)) return true;
   }
   return false;
 }
@@ -387,8 +369,8 @@ bool is_beyond(const std::vector<double>& t) {
   return std::ranges::any_of(t, [](double place) { return place < 0 || place > 1; });
 }
 
-bool same_numbers(const std::vector<SearchRange>& a, const std::vector<SearchRange>& b) {
-  return std::ranges::equal(a, b, {}, &SearchRange::info, &SearchRange::info);
+bool same_numbers(const std::vector<Searched>& a, const std::vector<Searched>& b) {
+  return std::ranges::equal(a, b, {}, &Searched::info, &Searched::info);
 }
 
 /// The pairs as a BRDF whose tangent is turned by an angle sees them.
@@ -481,7 +463,7 @@ std::optional<ModelFit> fit_model(const Model& model, const Compared& data, Matt
         return Candidate{i, std::move(t), error};
       };
       std::vector<double> defaults;
-      for (const SearchRange& r : problem.searched()) defaults.push_back(r.place(r.info->value[0]));
+      for (const Searched& r : problem.searched()) defaults.push_back(r.default_place());
       candidates.push_back(tried(std::move(defaults)));
       for (int k = 1; k <= kTries * int(n); ++k) candidates.push_back(tried(place_of_try(n, k)));
       const auto nearest =
@@ -540,7 +522,7 @@ std::optional<ModelFit> fit_model(const Model& model, const Compared& data, Matt
     }
   }
   Problem& problem = problems[best_problem];
-  const bool turns = std::ranges::any_of(problem.searched(), [](const SearchRange& r) { return is_circle(*r.info); });
+  const bool turns = std::ranges::any_of(problem.searched(), [](const Searched& r) { return is_circle(*r.info); });
   if (data.axes == Axes::Turned && !info.properties.isotropic && !turns && best->error > kTurnFrom &&
       !problem.searched().empty()) {
     const ModelFit::Turned turned = turned_fit(problem, data, best->matte.has_value());

@@ -20,10 +20,6 @@ struct KindRow {
   bool everywhere = true;
 };
 
-/// Highlights so many times narrower than those of the ranges are searched for, where a model accepts them. Exponents
-/// go as the inverse square of a width.
-constexpr double kNarrower = 100;
-
 /// The ranges end where a highlight is narrower than what most tables resolve, or as wide as a matte surface.
 const std::vector<KindRow>& rows() {
   static const std::vector<KindRow> out{
@@ -89,28 +85,17 @@ const std::vector<KindRow>& rows() {
   return out;
 }
 
-std::optional<double> narrowest(const Number& number, const ModelInfo& info) {
+/// Narrower highlights than those of the range are searched for, where a model accepts them.
+SearchRange search_of(const Number& number, const ModelInfo& info) {
   const auto p = std::ranges::find(info.params, number.names.front(), &ParamInfo::name);
+  double least = number.range.low, most = number.range.high;
   // Isotropy, which is 1 or less, is no width.
-  if (number.range.scale == Log && number.range.high == 1 && p->name != "p")
-    return std::max(p->min, number.range.low / kNarrower);
-  if (number.range.scale == Log1p) return std::min(p->max, number.range.high * kNarrower * kNarrower);
-  return std::nullopt;
+  if (number.range.scale == Log && number.range.high == 1 && p->name != "p") least = std::max(p->min, least / kBeyond);
+  if (number.range.scale == Log1p) most = std::min(p->max, most * kBeyondExponent);
+  return {number.range, least, most};
 }
 
 }  // namespace
-
-double LobeKind::Number::place(double value) const {
-  const double first = to_scale(range.scale, range.low);
-  return (to_scale(range.scale, value) - first) / (to_scale(range.scale, range.high) - first);
-}
-
-double LobeKind::Number::at(double t) const {
-  if (!narrowest || (t >= 0 && t <= 1)) return range.at(t);
-  const double first = to_scale(range.scale, range.low);
-  const double value = from_scale(range.scale, first + t * (to_scale(range.scale, range.high) - first));
-  return std::clamp(value, std::min(range.low, *narrowest), std::max(range.high, *narrowest));
-}
 
 std::vector<LobeKind> lobe_kinds(const std::vector<std::string>& names, bool isotropic) {
   const auto named = [&](const std::string& model) {
@@ -130,7 +115,7 @@ std::vector<LobeKind> lobe_kinds(const std::vector<std::string>& names, bool iso
     const Model& model = find_model(row.model);
     out.push_back({&model, complete(model.info(), parse_values(model.info(), row.choices)), row.color, row.numbers,
                    row.everywhere});
-    for (Number& number : out.back().numbers) number.narrowest = narrowest(number, model.info());
+    for (Number& number : out.back().numbers) number.search = search_of(number, model.info());
   }
   return out;
 }

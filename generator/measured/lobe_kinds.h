@@ -2,12 +2,11 @@
 // The lobes of which sums are made: models with all choices made and one colour, over ranges of their numbers.
 #pragma once
 
-#include <algorithm>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/axis_scale.h"
+#include "measured/search_range.h"
 #include "model/model.h"
 
 namespace brdfc::measured {
@@ -17,15 +16,7 @@ struct LobeKind {
     std::vector<std::string> names;  ///< parameters that have one value
     ScaledRange range;
     int places;  ///< where it is tried before a search
-    /// Where a search for narrower highlights ends, beyond the range; nullopt if it ends with the range.
-    std::optional<double> narrowest = {};
-
-    /// The value at a place, of which 0 and 1 are the ends of the range.
-    double at(double t) const;
-    /// The places between which a search takes place.
-    double first_place() const { return std::min(0., narrowest ? place(*narrowest) : 0.); }
-    double last_place() const { return std::max(1., narrowest ? place(*narrowest) : 1.); }
-    double place(double value) const;
+    SearchRange search = SearchRange(range);
   };
   const Model* model;
   ParamValues values;  ///< complete
