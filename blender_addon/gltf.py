@@ -41,14 +41,13 @@ def _fill(gltf2_material, near):
         metallic_roughness_texture=None,
         roughness_factor=near.roughness,
     )
-    extensions = dict(gltf2_material.extensions or {})
+    added = {}
     if near.metallic < 1:
-        extensions["KHR_materials_ior"] = {"ior": near.ior}
+        added["KHR_materials_ior"] = {"ior": near.ior}
         # The exporter drops an IOR that is alone.
-        extensions["KHR_materials_specular"] = {"specularFactor": 1.0}
+        added["KHR_materials_specular"] = {"specularFactor": 1.0}
     if near.transmission:
-        extensions["KHR_materials_transmission"] = {"transmissionFactor": 1.0}
-    gltf2_material.extensions = {
-        name: Extension(name, value, required=False) if isinstance(value, dict) else value
-        for name, value in extensions.items()
+        added["KHR_materials_transmission"] = {"transmissionFactor": 1.0}
+    gltf2_material.extensions = (gltf2_material.extensions or {}) | {
+        name: Extension(name, values, required=False) for name, values in added.items()
     }

@@ -41,7 +41,8 @@ _PARTS = [
     {"index": float(i), "side_across": 2.0 * (i % 2) - 1, "side_along": 2.0 * (i // 2) - 1}
     for i in range(slots.MOST_CONES)
 ]
-#: The outputs of the part "lit".
+#: Outputs of the part "lit". It is computed again wherever it is needed: the numbers of eight lamps
+#: would not fit SVM's stack beside the others.
 _LIT = [["lit_place", "VECTOR"], ["lit_across", "FLOAT"], ["lit_along", "FLOAT"]]
 #: Larger than the angle between any two directions.
 _FAR = 4.0

@@ -133,6 +133,7 @@ class NodeContext:
     def declared(self):
         """The codes of the settings and lamps that the form declares itself sensitive to."""
         codes = [] if device.is_eevee(self.scene) else self.form.get("warnings", [])
+        # Forms that declare both do so because of the model's mirror.
         if "clamp_mirror" in codes and not self.may_mirror:
             return [code for code in codes if code not in ("clamp_mirror", "multiple_importance")]
         return codes

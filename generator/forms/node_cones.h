@@ -136,8 +136,8 @@ T light_from(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& at
 /// to 1.4 times as far from the normal as the light: 0.2 % too large on average, 1.8 % off in absolute terms, at most
 /// 9 %.
 template <class T> T mean_light(const LampSlot<T>& slot, const LampAxes<T>& lamp, const Vec3<T>& axis, const T& chord) {
-  // Six directions, a hexagon about the axis, of which each has its mirror image or another one at the same angle to
-  // the lamp's normal. Over a disk, the mean distance from the middle is 2/3 of the radius.
+  // Six directions, a hexagon about the axis, of which two and two have the same angle to the lamp's normal. Over a
+  // disk, the mean distance from the middle is 2/3 of the radius.
   constexpr double kInner = 0.675;
   const double half_root3 = std::sqrt(0.75);
   const Spread<T> spread = spread_of(slot);

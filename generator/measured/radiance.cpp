@@ -217,8 +217,8 @@ class TreeTable final : public Table {
       return {i[0], i[1], o[0], o[1]};
     }
     // The outgoing direction is turned by the azimuth of the incident one. Of the first coordinate half is used.
-    const double r = std::hypot(d.x_i, d.y_i), cosPhi = r > 0 ? d.x_i / r : 1, sinPhi = r > 0 ? d.y_i / r : 0;
-    const auto o = square_of_disk(cosPhi * d.x_o + sinPhi * d.y_o, cosPhi * d.y_o - sinPhi * d.x_o);
+    const double r = std::hypot(d.x_i, d.y_i), cos_phi = r > 0 ? d.x_i / r : 1, sin_phi = r > 0 ? d.y_i / r : 0;
+    const auto o = square_of_disk(cos_phi * d.x_o + sin_phi * d.y_o, cos_phi * d.y_o - sin_phi * d.x_o);
     return {std::min((1 - r) / 2, std::nextafter(0.5, 0)), o[0], o[1], 0};
   }
 

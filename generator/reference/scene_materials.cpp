@@ -356,8 +356,7 @@ void require_models(const std::vector<Material>& materials) {
       if (const ModelInfo& info = m.sum[k].model->info(); !info.properties.albedo_table)
         input_error(
             "material {}: layer {}: {} has no Albedo output: no table can hold its albedo: only `brdfc render` and "
-            "twins have it "
-            "above other layers",
+            "twins have it above other layers",
             m.id, k + 1, info.label);
   }
 }

@@ -33,6 +33,11 @@ BASES = {"Full": FULL, "Half": HALF, "Quarter": QUARTER}
 SMALL = ((0, 40, 90), (1, 4))
 
 
+def small(*blocks, **more):
+    """A file with the basis SMALL, named "s"."""
+    return bsdf(*blocks, described=table("s", SMALL), **more)
+
+
 def lopsided_light(wi, wo):
     """Not the same when light and view are swapped, when both are turned, nor in a mirror."""
     return lopsided(wi, wo)[:, 0] * (1 + 0.4 * wi[:, 0] + 0.3 * wo[:, 1])
@@ -172,7 +177,6 @@ def test_names_that_have_two_meanings(tmp_path):
 
 
 def test_what_is_not_read_is_said(tmp_path):
-    small = table("s", SMALL)
     values = np.full((5, 5), 0.2)
     values[2, 3] = -1
     parts = [
@@ -180,15 +184,15 @@ def test_what_is_not_read_is_said(tmp_path):
         for wavelength in ("Solar", "Visible")
         for direction in ("Transmission Front", "Reflection Back", "Reflection Front")
     ]
-    file = write(tmp_path, bsdf(*parts, described=small))
+    file = write(tmp_path, small(*parts))
     notes = told(file)["notes"]
     assert notes[0] == (
         "Reflection Front is read, not Transmission Front, Reflection Back, the data for Solar"
     )
     assert notes[1] == "1 number is negative, 4 %: taken for 0"
-    file = write(tmp_path, bsdf(*parts[:5], described=small))
+    file = write(tmp_path, small(*parts[:5]))
     assert told(file)["notes"][0].startswith("Reflection Back is read, not Transmission Front")
-    one = write(tmp_path, bsdf(parts[5], "</Layer><Layer>", parts[5], described=small))
+    one = write(tmp_path, small(parts[5], "</Layer><Layer>", parts[5]))
     assert told(one)["notes"][-1] == "there are several layers: the first one is read"
 
 
@@ -202,19 +206,18 @@ def coloured(rgb, basis="s", names=("CIE-X", "Visible", "CIE-Z")):
 
 def test_colours_are_those_of_radiance(tmp_path):
     """What genBSDF's matrix made of red, green and blue, with four digits."""
-    small = table("s", SMALL)
     wi, wo = hemisphere(10, 1, 0.1), hemisphere(10, 2, 0.1)
     for rgb in ((0.4, 0.4, 0.4), (0.6, 0.2, 0.1), (0.1, 0.3, 0.5)):
-        file = write(tmp_path, bsdf(*coloured(rgb), described=small))
+        file = write(tmp_path, small(*coloured(rgb)))
         found = np.pi * pairs(file, wi, wo)[0]
         np.testing.assert_allclose(found, np.broadcast_to(rgb, found.shape), rtol=3e-3)
         assert not any("grey" in note for note in told(file)["notes"])
-    beyond = write(tmp_path, bsdf(*coloured((-0.1, 0.2, 0.4)), described=small))
+    beyond = write(tmp_path, small(*coloured((-0.1, 0.2, 0.4))))
     assert (
         "25 cells have a colour outside Radiance's RGB, 100 %: negative channels are taken for 0"
     ) in told(beyond)["notes"]
     some = coloured((0.6, 0.2, 0.1))
-    file = write(tmp_path, bsdf(*some[:2], described=small))
+    file = write(tmp_path, small(*some[:2]))
     assert "CIE-X is there and CIE-Z is not: without both the data are grey" in told(file)["notes"]
     assert len(set(pairs(file, wi, wo)[0][0])) == 1
 
@@ -261,9 +264,7 @@ def test_colours_of_trees(tmp_path):
 
 
 def test_text_in_other_encodings(tmp_path):
-    text = bsdf(
-        matrix(np.ones((5, 5)), "s"), described=table("s", SMALL), name="Gewebe,\n gr\u00fcn "
-    )
+    text = small(matrix(np.ones((5, 5)), "s"), name="Gewebe,\n gr\u00fcn ")
     for encoding in ("utf-16", "utf-8-sig"):
         content = text.replace('encoding="UTF-8"', "").encode(encoding)
         assert told(write(tmp_path, content))["description"] == "Gewebe, gr\u00fcn, Weaver"
@@ -276,7 +277,7 @@ def test_text_in_other_encodings(tmp_path):
 
 
 def test_a_scene_is_lit_by_the_data(tmp_path):
-    file = write(tmp_path, bsdf(*coloured((0.5, 0.3, 0.2)), described=table("s", SMALL)))
+    file = write(tmp_path, small(*coloured((0.5, 0.3, 0.2))))
     content = scene(
         materials={"m": {"measured": file.name}}, environment={"color": [1, 1, 1]}, **PLANE
     )
@@ -291,7 +292,7 @@ def test_a_scene_is_lit_by_the_data(tmp_path):
     np.testing.assert_allclose(pixels.mean((0, 1)), [0.5, 0.3, 0.2], rtol=0.04)
 
 
-GOOD = bsdf(matrix(np.ones((5, 5)), "s"), described=table("s", SMALL))
+GOOD = small(matrix(np.ones((5, 5)), "s"))
 TREE = bsdf(data("{ 1 }", basis=None), structure="TensorTree4")
 #: Content, and what is said of it.
 BAD = {
@@ -316,9 +317,9 @@ BAD = {
         "Transmission Back",
     ),
     "solar": (GOOD.replace(">Visible<", ">Solar<"), "found Solar, Reflection Front"),
-    "no data": (bsdf(described=table("s", SMALL)), "Reflection Back, found none"),
+    "no data": (small(), "Reflection Back, found none"),
     "twice": (
-        bsdf(*[matrix(np.ones((5, 5)), "s")] * 2, described=table("s", SMALL)),
+        small(*[matrix(np.ones((5, 5)), "s")] * 2),
         "WavelengthData Visible, Reflection Front: expected once, found again",
     ),
     "basis": (
@@ -348,21 +349,20 @@ BAD = {
         "AngleBasis s: UpperTheta: expected a number, got 'wide'",
     ),
     "few": (
-        bsdf(matrix(np.ones((5, 4)), "s"), described=table("s", SMALL)),
+        small(matrix(np.ones((5, 4)), "s")),
         "ScatteringData: expected 5 x 5 numbers, because s has 5 patches, found 20: truncated?",
     ),
     "many": (
-        bsdf(matrix(np.ones((5, 6)), "s"), described=table("s", SMALL)),
+        small(matrix(np.ones((5, 6)), "s")),
         "ScatteringData: expected 5 x 5 numbers, because s has 5 patches, found 30\n",
     ),
     "none": (
-        bsdf(data(" ", basis="s"), described=table("s", SMALL)),
+        small(data(" ", basis="s")),
         "Reflection Front: ScatteringData: expected numbers, found none",
     ),
     "nan": (
-        bsdf(
+        small(
             matrix(np.where(np.arange(25).reshape(5, 5) == 7, np.nan, 1), "s"),
-            described=table("s", SMALL),
         ),
         "ScatteringData: number 8: expected a finite number up to 1e+30, got 'nan'",
     ),
@@ -375,7 +375,7 @@ BAD = {
         "number 2: expected a finite number up to 1e+30, got ''",
     ),
     "black": (
-        bsdf(matrix(np.zeros((5, 5)), "s"), described=table("s", SMALL)),
+        small(matrix(np.zeros((5, 5)), "s")),
         "expected a number above 0, found none: the data are black",
     ),
     "tree": (TREE.replace("{ 1 }", "{ 1 2 }"), "expected 1, 16, 256 or so numbers in braces"),
