@@ -121,12 +121,13 @@ def _part_group(parts):
         at_point = here.add("value", **(found | {"wi": w.local(point, frame)}))
         placed = here.add("cone_at", **found)
         pick = w.math("FRACT", w.math("MULTIPLY", found["u_2"], 64.0))
-        known = found | at_point | placed | on_flat | {"pick": pick}
+        beam = here.add("beam", **(found | placed | {"wi": point}))
+        known = found | at_point | placed | on_flat | beam | {"pick": pick}
         lobe = here.add("lobe", **known)
         axis = w.mix(lobe["whole"], placed["axis"], found["aim"], True)
         return {"BSDF": w.toon(lobe["color"], lobe["size"], w.half(axis, found["view"]))}
 
-    used = ("value", "flat", "cone_at", "lobe")
+    used = ("value", "flat", "cone_at", "beam", "lobe")
     content = ["part of lamp", {name: parts.data[name] for name in used}]
     title = f"{parts.title}: part of lamp"
     return make_group(title, content, inputs, [["BSDF", "SHADER"]], fill)

@@ -147,6 +147,69 @@ template <class T> T mean_light(const LampSlot<T>& slot, const LampAxes<T>& lamp
   return (spread.light(straight + aside) + spread.light(straight) + spread.light(straight - aside)) / T(3);
 }
 
+/// A spot shines within a cone about its axis. As in Cycles (kernel/light/spot.h), its light fades with smoothstep of
+/// the cosine of the angle to that axis.
+template <class T> struct SpotCone {
+  decltype(T(0) > T(0)) is_spot;
+  T edge;  ///< cosine of half the cone's angle
+  T fade;  ///< the difference of cosines over which the light fades
+
+  /// The light from a direction whose cosine is given, in units of the spot's greatest; 1 for other lamps.
+  T light(const T& cosine) const { return select(is_spot, smoothstep(cosine - edge), T(1)); }
+
+  /// The mean of light() over a cone of directions. `cosine`: of the angle between its axis and the spot's. `chord`:
+  /// its radius. Off by at most 0.007 in absolute terms for spots of up to 90 degrees and lamps that look up to 0.3 rad
+  /// large, by 0.02 for wider ones.
+  T mean(const T& cosine, const T& chord) const {
+    constexpr double kEven = 1.2;
+    // Of the brightest direction. Where less of the cone shines, errors of the mean could be larger than the mean.
+    constexpr double kLeast = 1.0 / 50;
+    const T chord2 = sqr(chord), middle = cosine * (T(1) - chord2 / T(4)) - edge, bent = cosine * (chord2 / T(12));
+    const T spread = sqrt((T(1) - sqr(cosine)) * chord2 * (T(1) - chord2 / T(4)));
+    // Where the light fades over more than the cone: Gauss and Chebyshev's rule of the second kind, with three points.
+    const T aside = spread * T(std::sqrt(0.5));
+    const T beside = smoothstep(middle - bent + aside) + smoothstep(middle - bent - aside);
+    const T even = smoothstep(middle + bent) / T(2) + beside / T(4);
+    // Elsewhere: smoothstep is the mean of steps, with the weight 6 t (1 - t), for which this is Gauss and Jacobi's
+    // rule.
+    const double off = std::sqrt(0.05);
+    const T steps = (part_inside(T(0.5 - off), cosine, chord2) + part_inside(T(0.5 + off), cosine, chord2)) / T(2);
+    const T mean = select((spread + bent * T(6)) * T(kEven) < fade, even, steps);
+    return select(is_spot, maximum(mean, smoothstep(middle + spread) * T(kLeast)), T(1));
+  }
+
+ private:
+  /// 0 up to x = 0 and 1 from x = fade on.
+  T smoothstep(const T& x) const {
+    const T t = maximum(minimum(x / fade, T(1)), T(0));
+    return sqr(t) * (T(3) - T(2) * t);
+  }
+
+  /// The part of a cone of directions within the cone about the spot's axis at whose rim the light has faded to
+  /// smoothstep(t): the area in which two circles in a plane overlap.
+  T part_inside(const T& t, const T& cosine, const T& chord2) const {
+    constexpr double kLeast = 1e-3;
+    // Chords between directions at an angle get shorter by the cosine of half that angle, radially.
+    const T small2 = chord2 * ((T(1) + cosine) / T(2)), large2 = T(2) * (T(1) - edge - fade * t);
+    const T apart2 = maximum(T(2) * (T(1) - cosine), T(kLeast * kLeast)), apart = sqrt(apart2);
+    const T small = sqrt(small2), large = sqrt(maximum(large2, T(kLeast * kLeast)));
+    const auto cosine_at = [&](const T& own, const T& own2, const T& other2) {
+      return maximum(minimum((apart2 + own2 - other2) / (T(2) * apart * own), T(1)), T(-1));
+    };
+    const auto angle = [](const T& x) { return T(2) * atan(sqrt((T(1) - x) / maximum(T(1) + x, tiny<T>()))); };
+    const T at_small = cosine_at(small, small2, large2), at_large = cosine_at(large, large2, small2);
+    const T triangles = apart * (small * sqrt(T(1) - sqr(at_small)));
+    return (small2 * angle(at_small) + large2 * angle(at_large) - triangles) / (pi<T>() * small2);
+  }
+};
+template <class T> SpotCone<T> spot_cone(const LampSlot<T>& slot) {
+  constexpr double kLeast = 1e-4;  // Blender's spots may have no soft edge
+  const T edge = cos(slot.shape.z / T(2));
+  // 1 plus 0.45 times the blend: see brdfc_lamp() in osl/brdfc.osl.in.
+  return {slot.kind < T(1.5) && T(0) < slot.shape.z, edge,
+          maximum((slot.kind - T(1)) * T(1 / 0.45), T(kLeast)) * (T(1) - edge)};
+}
+
 /// How the cones of a flat lamp are arranged: 1 to 4 of them in a row along the axis `across`, or -2 to -4 along the
 /// axis `along`, or kGrid for two by two.
 inline constexpr double kGrid = 8;

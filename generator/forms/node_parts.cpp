@@ -165,6 +165,14 @@ NodeProgram record_flat() {
     p.output("bounds", point.bounds);
   });
 }
+NodeProgram record_beam() {
+  return recorded([](Program& p) {
+    const SpotCone<Expr> spot = spot_cone(slot_input());
+    const Vec3<Expr> away = input3("away");
+    p.output("beam",
+             spot.light(dot(away, input3("wi"))) / spot.mean(dot(away, input3("axis")), Expr::input("of_part")));
+  });
+}
 NodeProgram record_met() {
   return recorded([](Program& p) {
     LampCone<Expr> cone;
@@ -188,7 +196,7 @@ NodeProgram record_lobe() {
     cone.cones.layout = Expr::input("layout");
     cone.drop = Expr::input("drop");
     const Expr emphasis = select(cone.flat > Expr(0.5), Expr::input("emphasis"), times_cone(cone, cone.of_cones));
-    const Expr share = select(cone.flat > Expr(0.5), Expr::input("light") / Expr::input("mean"), Expr(1.0));
+    const Expr share = select(cone.flat > Expr(0.5), Expr::input("light") / Expr::input("mean"), Expr::input("beam"));
     const ToonLobe<Expr> lobe = toon_lobe(
         input3("shape"), cone, Expr::input("of_part"), Expr::input("bounds"), Expr::input("index"), Expr::input("pick"),
         emphasis, share, Expr::input("density"), Expr::input("room"), Rgb<Expr>::input("value"), Expr::input("u_2"));

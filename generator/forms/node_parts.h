@@ -25,6 +25,8 @@ print::NodeProgram record_count();
 print::NodeProgram record_cone_at();
 print::NodeProgram record_aside();
 print::NodeProgram record_flat();
+/// The light of a spot from the point where the model's value is taken, divided by its mean over the cone.
+print::NodeProgram record_beam();
 print::NodeProgram record_met();
 print::NodeProgram record_lobe();
 /// The weight of the drawn direction. `lost` is the part of its light that a lamp's closure carries, and 1 below the

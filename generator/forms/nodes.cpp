@@ -371,6 +371,7 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
     add("cone_at", record_cone_at());
     add("aside", record_aside());
     add("flat", record_flat());
+    add("beam", record_beam());
     add("met", record_met());
     add("lobe", record_lobe());
     out.lamps = max_lamps;
