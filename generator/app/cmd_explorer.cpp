@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void run(const fs::path& out) {
+void write_explorer(const fs::path& out) {
   pack::require_explorer(out);
   const auto files = pack::explorer_page(models_named(""), data_path("explorer"));
   // Files of an earlier version would otherwise stay.
@@ -32,7 +32,7 @@ void add_explorer_command(Command app) {
                          "Writes a page that shows all models in a browser, from their formulas: curves,\n"
                          "albedo, lit spheres, differences. It needs WebGL 2, but no server or network.");
   cmd.add_option("--out", *out, "Folder for the page; open its index.html").required();
-  cmd.callback([out] { run(*out); });
+  cmd.callback([out] { write_explorer(*out); });
 }
 
 }  // namespace brdfc::app
