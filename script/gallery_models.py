@@ -348,7 +348,7 @@ def materials_of(model, count):
         {"model": model["name"], "parameters": dict(e["values"])}
         | ({"optical": e["substance"]} if "substance" in e else {})
         for e in plain or entries
-    ]
+    ] or [{"model": model["name"], "parameters": {}}]
     axis, first = axis_of(model), made[0]
     for value in values_of(axis):
         value = [value] * 3 if axis["kind"] == "color" else value
