@@ -154,11 +154,16 @@ std::optional<double> unevenness(const Brdf<double>& brdf, int pairs, Random& ra
   least.fill(std::numeric_limits<double>::infinity());
   for (int i = 0; i < pairs; ++i) {
     const Vec3<double> wo = uniform_direction(random);
-    const auto f = channels(brdf.eval(uniform_direction(random), wo));
-    for (std::size_t c = 0; c < 3; ++c) {
-      least[c] = std::min(least[c], f[c]);
-      most[c] = std::max(most[c], f[c]);
-    }
+    const auto add = [&](const Vec3<double>& wi) {
+      const auto f = channels(brdf.eval(wi, wo));
+      for (std::size_t c = 0; c < 3; ++c) {
+        least[c] = std::min(least[c], f[c]);
+        most[c] = std::max(most[c], f[c]);
+      }
+    };
+    add(uniform_direction(random));
+    // Directions of the model's own find a lobe that is too narrow for uniform ones.
+    if (const Sample<double> s = brdf.sample(wo, uniform_cube(random)); s.pdf > 0) add(s.wi);
   }
   double worst = 0;
   for (std::size_t c = 0; c < 3; ++c) {
