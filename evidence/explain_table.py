@@ -32,9 +32,10 @@ the sizes of the whole shader, which has all parameters, and of the shader for t
 - **Costs** are those in [what each form takes](tables/forms.md). They were measured for each model
   and form with default parameters, so they do not show what constants save. **Errors** are measured
   with the scene's parameters.
-- **Bytes and statements** are those of a shader's text with all combinations of its choices,
-  statements without those of the library. **Operations** are the largest number that one
-  combination executes. **Floats** are those of the tables of albedo and fit that the shader reads.
+- **Bytes and statements** are counted in a shader's text, which has all combinations of its
+  choices. Statements of the library are not counted. **Operations** are the largest number that
+  one combination executes. **Floats** are those of the tables of albedo and fit that the shader
+  reads.
 - A fit is made for the scene's parameters, so a fitted form has no other shader to compare with.
 - If a constant colour becomes part of a table, the table becomes three, one for each channel. Bytes
   or floats may then increase.

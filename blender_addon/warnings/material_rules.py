@@ -22,8 +22,8 @@ def too_many_closures(at):
 
 
 def few_lamps(at):
-    """Beside the closures of this material Cycles has room for fewer lamps than the scene has, or
-    beside the numbers that several models as Formula Nodes keep."""
+    """The closures of this material, or the numbers that several models as Formula Nodes keep,
+    leave room in Cycles for fewer lamps than the scene has."""
     most = closure_slots.most()
     if not at.nodes or at.use.slots > most:
         return

@@ -140,7 +140,7 @@ def normal_pass(at):
 
 
 def leaning_facets(at):
-    """Blender is older than 5.0, and Blender's own nodes imitate the model with a normal that
-    leans."""
+    """Blender is older than 5.0, and Blender's own nodes imitate the model with a tilted
+    normal."""
     # Measured (tests/blender/test_every_fit.py); later versions are right.
     return when(bpy.app.version < (5, 0, 0) and at.of_scene.in_cycles)

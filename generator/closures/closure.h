@@ -102,8 +102,9 @@ template <class T> Rgb<T> fresnel_at_82(const Rgb<T>& f0) {
   constexpr double kGrazing = 7776. / 16807;  // (6/7)^5
   return f0 + (Rgb<T>(T(1)) - f0) * T(kGrazing);
 }
-/// The Fresnel term of metals with an Edge Tint, of one minus the cosine at which facets are seen. P. Kutz, M. Hasan,
-/// D. Edmondson: Novel Aspects of the Adobe Standard Material, 2021; Cycles takes what is negative for 0.
+/// The Fresnel term of metals with an Edge Tint, as a function of one minus the cosine at which facets are seen. P.
+/// Kutz, M. Hasan, D. Edmondson: Novel Aspects of the Adobe Standard Material, 2021; Cycles takes what is negative for
+/// 0.
 template <class T> Rgb<T> metal_fresnel(const Rgb<T>& f0, const Rgb<T>& edge, const T& one_minus_cos) {
   const Rgb<T> one(T(1));
   const T s = T(7. / 6) * one_minus_cos, s2 = s * s, q = T(7) * (T(1) - one_minus_cos) * s2 * s2 * s2;

@@ -106,7 +106,7 @@ struct ViewError {
   double negative = 0;     ///< integral of the part below 0, divided by the albedo
   double number = 0;       ///< for a fit along a number: its value, in units of the parameter
 };
-/// The larger of each error of the two, for the same view; `number` is that of the first.
+/// For each error, the larger of the two, which are of the same view; `number` is that of the first.
 ViewError worse(const ViewError&, const ViewError&);
 /// The errors of `closures`, which returns their sum for a view, at ViewSettings::error_views cosines evenly spaced
 /// from 1 to 0.

@@ -379,8 +379,8 @@ template <class T> LampCone<T> cone_of(const LampSlot<T>& given, const LampAxes<
   const T height_of_lamp = dot(lamp.away, centre), facing = height_of_lamp * nearness;
   const T narrower = minimum(lamp.half_across, lamp.half_along) * nearness;
   // Half the length of the sum of the cone's axis and the viewer's direction is the cosine between the axis and the
-  // closure's normal. The whole cone has to be above the horizon of that normal, and so does each of several.
-  // An axis that is raised from the horizon, see below, only increases that cosine where it is small.
+  // closure's normal. The whole cone has to be above the horizon of that normal; if there are several, each of them. An
+  // axis that is raised from the horizon, see below, only increases that cosine where it is small.
   const T above_closure = sqrt(T(0.5) * dot(cone.towards, wo) + T(0.5)) - T(kLeastRise);
   const auto several = T(1.5) < slot.most && T(0.5) < part.level && above_closure > narrower + diagonal * T(0.5);
   cone.cones = cones_of_flat(slot, lamp, centre, several, T(kWide) < diagonal);

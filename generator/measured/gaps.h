@@ -8,7 +8,7 @@
 
 namespace brdfc::measured {
 
-/// What fill_gaps() does, for people.
+/// What fill_gaps() does, in words for a message.
 inline constexpr const char* kFilled =
     "filled along theta_d; where a row has nothing, along phi_d, then theta_h: linear in between, constant beyond";
 

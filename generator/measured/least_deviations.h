@@ -10,8 +10,8 @@ namespace brdfc::measured {
 inline constexpr int kDeviationRounds = 24, kFewRounds = 10;
 
 /// The x in [0, high] that minimise the sum of weight |target - columns x|: least squares with weights that follow the
-/// deviations. `scale` is the mean of the data; a deviation below a floor counts as the floor, which begins there and
-/// falls from round to round.
+/// deviations. A deviation below a floor counts as the floor, which is `scale`, the mean of the data, in the first
+/// round and falls from round to round.
 Eigen::VectorXd least_deviations(const Eigen::MatrixXd& columns, const Eigen::VectorXd& target,
                                  const Eigen::VectorXd& weight, double scale, const Eigen::VectorXd& high,
                                  int rounds = kDeviationRounds);

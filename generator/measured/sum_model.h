@@ -21,7 +21,8 @@ enum class Stack {
   Sum,
   /// The first lobe is on top. A lobe below others has its f times the product of 1 - A over these, where A is the
   /// largest channel of the albedo for the view, averaged over the azimuth. So does Cycles' Principled node. Layers
-  /// that gain no light gain none together. They are not reciprocal: light is not attenuated by its own direction.
+  /// that gain no light gain none together. They are not reciprocal, because the factor does not depend on
+  /// the direction of the light.
   Layers
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What stands between the program and OpenImageIO. As a module this side of it is a shared library of its own, so
-// errors are returned, not thrown: two libraries may hold two copies of an exception's type.
+// What stands between the program and OpenImageIO. If it is a module, this side of it is a shared library of its own.
+// So errors are returned, not thrown: two libraries may hold two copies of an exception's type.
 #pragma once
 
 #include <filesystem>

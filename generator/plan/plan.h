@@ -79,7 +79,8 @@ struct Budget {
   std::vector<std::string> sizeless = {};
   /// The number of lamps to aim at; nullopt if it is not known.
   std::optional<int> lamps = {};
-  /// Blender's own nodes with a model's formulas come beside forms that are left open.
+  /// Where a material leaves its form open, also plans the form that runs without Open Shading Language: Blender's own
+  /// nodes with the model's formulas.
   bool nodes = false;
 };
 

@@ -35,7 +35,7 @@ const std::array<WorkingSpace, 3>& working_spaces();
 /// An OpenColorIO configuration. Its role "scene_linear" is the working space, in which renderers compute.
 class ColorConfig {
  public:
-  /// Throws InputError that names the file, and also its version if this OpenColorIO can't read such a late one.
+  /// Throws InputError that names the file, and also its version if that is too new for this OpenColorIO.
   explicit ColorConfig(const std::filesystem::path& file);
   ColorConfig(ColorConfig&&) noexcept;
   ~ColorConfig();
