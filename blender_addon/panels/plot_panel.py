@@ -135,7 +135,7 @@ def draw_plots(layout, material):
         wrapped(column, say("Above: light from 45\u00b0, and where it goes"))
         for said in _legend(node, legend):
             wrapped(column, said)
-        wrapped(column, say("Middle: under a lamp, by the strokes below"))
+        wrapped(column, say("Middle: under a lamp; the line below a ball tells which it is"))
         wrapped(column, say("Below: albedo, views from 0° to 90°"))
         _, linked = nearest_node.values(node)
         if linked:

@@ -55,8 +55,8 @@ OF_SCENE = (
     Row(
         "black_aovs",
         WARNING,
-        "Open Shading Language is on: Cycles leaves AOVs black then ({names}); the picture itself "
-        "is right",
+        "With Open Shading Language on, Cycles leaves AOVs black ({names}); the picture itself is "
+        "right",
         scene_rules.black_aovs,
     ),
     Row(
@@ -70,8 +70,8 @@ OF_SCENE = (
     Row(
         "device_elsewhere",
         WARNING,
-        "The device is GPU Compute: a computer whose preferences have a GPU renders on that, and "
-        "few can run these shaders",
+        "The device is GPU Compute: a computer with a GPU in its preferences renders on that GPU, "
+        "and few GPUs can run these shaders",
         scene_rules.device_of_another_computer,
         USE_CPU,
     ),
@@ -324,8 +324,8 @@ OF_MATERIAL = (
     Row(
         "closures",
         WARNING,
-        "Cycles has room for {count} lamps beside the shaders of this material, so the light of "
-        "more lamps is noisy in every material: use fewer models in it",
+        "Beside the shaders of this material Cycles has room for {count} lamps, so the light of "
+        "any other lamp is noisy in every material: use fewer models in this one",
         material_rules.few_lamps,
         more="{taken}",
     ),

@@ -171,7 +171,7 @@ template <class T> T matte_loss(const T& c) {
 /// The cosine-weighted mean of matte_loss() over all directions.
 inline constexpr double kMeanMatteLoss = kPi / 2 - 2.0 / 3 - (2 * kPi - 5.6) / 3;
 
-/// Rough matte facets, with what their colours multiply: M. Oren, S. Nayar: Generalization of Lambert's Reflectance
+/// Rough matte facets, as the terms that colours multiply: M. Oren, S. Nayar: Generalization of Lambert's Reflectance
 /// Model, SIGGRAPH 1994, in the form of Y. Fujii: A Tiny Improvement of Oren-Nayar Reflectance Model; with
 /// interreflection between facets as in J. Portsmouth, P. Kutz, S. Hill: EON: A Practical Energy-Preserving Rough
 /// Diffuse BRDF, JCGT 2025.

@@ -34,7 +34,8 @@ template <class T> struct FresnelDielectric : DielectricBoundary<T> {
                            "Refraction Tint",
                            {1, 1, 1},
                            "Share of the refracted light that is left each time it passes the surface"});
-    v(reflected, ColorSpec{"reflected", "Reflection Tint", {1, 1, 1}, "Share of the reflected light that is left"});
+    v(reflected,
+      ColorSpec{"reflected", "Reflection Tint", {1, 1, 1}, "Fraction of the reflected light that is not absorbed"});
   }
 
   Rgb<T> mirror(const Vec3<T>& wo) const { return DielectricBoundary<T>::mirror(wo) * reflected; }

@@ -66,7 +66,8 @@ template <class T> struct RoughGlass {
                            "Refraction Tint",
                            {1, 1, 1},
                            "Share of the refracted light that is left each time it passes the surface"});
-    v(reflected, ColorSpec{"reflected", "Reflection Tint", {1, 1, 1}, "Share of the reflected light that is left"});
+    v(reflected,
+      ColorSpec{"reflected", "Reflection Tint", {1, 1, 1}, "Fraction of the reflected light that is not absorbed"});
   }
 
   T ior() const { return index; }

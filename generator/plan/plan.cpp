@@ -331,9 +331,9 @@ PlannedModel plan_model(const Model& model, const Needs& needs, const Budget& bu
     }
   plan.max_lamps = lamp_slots(budget);
   if (aimed && plan.max_lamps < forms::kMaxLamps)
-    plan.reasons.push_back(plan.max_lamps == 0
-                               ? std::string("slots for lamps: the scene has none")
-                               : fmt::format("slots for lamps beyond {}: the scene has no more", plan.max_lamps));
+    plan.reasons.push_back(plan.max_lamps == 0 ? std::string("slots for lamps: the scene has none")
+                                               : fmt::format("slots for more than {} lamp{}: the scene has no more",
+                                                             plan.max_lamps, plan.max_lamps == 1 ? "" : "s"));
   plan.views = views_of(needs);
   std::vector<std::string> unseen;
   const auto degrees = [](double cosine) { return std::acos(cosine) * 180 / kPi; };

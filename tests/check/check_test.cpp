@@ -10,6 +10,7 @@
 #include "faulty.h"
 #include "measure/albedo.h"
 #include "measure/bound_model.h"
+#include "measure/properties.h"
 #include "measure/tabulate_albedo.h"
 #include "support.h"
 
@@ -150,6 +151,12 @@ TEST(Checks, SeeWeightsThatVary) { EXPECT_FALSE(outcome<kPdf>().at("exact sampli
 TEST(Checks, SeeALobeThatItsSamplerDoesNotKnow) {
   EXPECT_FALSE(outcome<kShadow>().at("sampling variance"));
   EXPECT_TRUE(outcome<kDark>().at("sampling variance"));
+}
+TEST(Checks, SeeAHighlightThatUniformDirectionsMiss) {
+  const Model& model = find_model("kelemen");
+  const measure::BoundModel bound = measure::bind_model(model, parse_values(model.info(), {"m=0.001"}));
+  measure::Random random(1);
+  EXPECT_GT(measure::unevenness(*bound.brdf, 128, random).value(), 0.999);
 }
 TEST(Checks, SayWhyOneDoesNotApply) {
   const Row skipped = row_of(find_model("fresnel_dielectric"), "chi-square");

@@ -79,7 +79,7 @@ TEST(Plan, HasASlotForEveryLampAndNoMore) {
     return plan.reasons;
   };
   EXPECT_THAT(reasons(0), testing::Contains("slots for lamps: the scene has none"));
-  EXPECT_THAT(reasons(3), testing::Contains("slots for lamps beyond 3: the scene has no more"));
+  EXPECT_THAT(reasons(3), testing::Contains("slots for more than 3 lamps: the scene has no more"));
   for (const std::optional<int> all : {std::optional<int>(), std::optional<int>(8), std::optional<int>(20)})
     EXPECT_THAT(reasons(all), Not(testing::Contains(HasSubstr("slots for lamps"))));
 

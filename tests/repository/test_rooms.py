@@ -32,6 +32,41 @@ def test_a_room_includes_what_it_links_and_that_is_above(room):
     assert all(order.index(other) < order.index(room) for other in BELOW[room])
 
 
+def helpers(source):
+    """Functions with their parameters, types and constants of the anonymous namespaces of a
+    source."""
+    for body in re.findall(r"^namespace \{\n(.*?)^\}  // namespace$", source, re.S | re.M):
+        body = re.sub(r"//.*", "", body)
+        yield from re.findall(r"^(?:struct|class|enum class) (\w+)", body, re.M)
+        yield from re.findall(r"^(?:constexpr|const) [^(\n]*?(\w+)(?:\[\])?(?: =|\{)", body, re.M)
+        for name, parameters in re.findall(
+            r"^\w[^\n=(]*[ &*>](\w+)\(([^{;]*)\)[^;{]*\{", body, re.M
+        ):
+            types = [re.sub(r"(\W)\w+$", r"\1", p.strip()) for p in parameters.split(",")]
+            yield f"{name}({', '.join(' '.join(t.split()) for t in types)})"
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_sources_of_a_room_have_helpers_of_different_names(room):
+    """The preset `release` compiles several sources as one: a new file moves others together."""
+    found = {}
+    for path in sorted((ROOT / "generator" / room).glob("*.cpp")):
+        for name in set(helpers(path.read_text(encoding="utf-8"))):
+            found.setdefault(name, []).append(path.name)
+    assert not {name: files for name, files in found.items() if len(files) > 1}
+
+
+def test_a_helper_that_two_sources_have_is_found():
+    one = (
+        "namespace {\n\nvoid run(const Path& out) {\n}\nconstexpr int kMost = 1;\n}  // namespace\n"
+    )
+    other = (
+        "namespace {\nvoid run(const Path& folder) {\n}\nvoid run(int x) {\n}\n}  // namespace\n"
+    )
+    assert set(helpers(one)) == {"run(const Path&)", "kMost"}
+    assert set(helpers(other)) == {"run(const Path&)", "run(int)"}
+
+
 def test_the_extension_imports_downwards_alone():
     done = subprocess.run([LINTER, "--no-cache"], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
