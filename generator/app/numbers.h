@@ -43,8 +43,12 @@ N accepted_number(const std::string& option, std::string_view text, const Accept
   const bool has_unit = range.unit != 0 && text.ends_with(range.unit);
   const std::optional<N> number = parse<N>(text.substr(0, text.size() - has_unit));
   const bool finite = number && std::isfinite(double(*number));
-  if (!finite || !(*number >= range.low && *number <= range.high) || (range.above_low && *number == range.low))
-    refuse(option, fmt::format("expected {}, got '{}'", range.text(), text));
+  if (!finite || !(*number >= range.low && *number <= range.high) || (range.above_low && *number == range.low)) {
+    const bool too_long =
+        std::integral<N> && !number && text.find_first_not_of("0123456789") == text.npos && !text.empty();
+    refuse(option, fmt::format("expected {}{}, got '{}'", range.text(),
+                               too_long ? fmt::format(", at most {}", range.high) : "", text));
+  }
   return *number;
 }
 

@@ -199,6 +199,10 @@ def test_eval_says_what_is_wrong_with_its_input(stdin, words):
             ["sample", "lambert", "--count", "-1", "--wo", "0,0,1"],
             ["--count", "whole number from 1"],
         ),
+        (
+            ["sample", "lambert", "--count", "99999999999", "--wo", "0,0,1"],
+            ["--count", "at most 2147483647"],
+        ),
         (["sample", "lambert", "--count", "3"], ["--wo"]),
         (["sample", "lambert", "--count", "3", "--wo", "0,0,2"], ["--wo", "unit vector"]),
         (["sample", "lambert", "--pattern", "regular"], ["--count"]),
