@@ -162,8 +162,8 @@ def measured_fits(path):
     brdfc.
 
     Returns a Measured: its `fits` are the models, the closest first, each with `model`,
-    `parameters`, `matte` and `error`. Raises MeasuredError without the program, and for a file that
-    it refuses.
+    `parameters`, `matte` and `error`; `stopped`, `turned` and remarks() tell what keeps it from
+    coming closer. Raises MeasuredError without the program, and for a file that it refuses.
     """
     return start_measured_fits(path).wait()
 
@@ -203,9 +203,9 @@ def new_measured_library(folder, blend, model=None, representation="auto"):
     folders whose names begin with a dot are left out. Takes some ten seconds a file.
 
     Returns a MeasuredLibrary: `blend`, `catalogs`, and by file the names of its `materials`,
-    `refusals`, a sentence for each file of which no material was made, and `notes`, what the data
-    lack. Raises ValueError for arguments that are wrong, and MeasuredError without the program or
-    without any material; no file is changed then.
+    `refusals`, a sentence for each file of which no material was made, `notes`, what the data lack,
+    and `remarks`, what keeps the fit from coming closer. Raises ValueError for arguments that are
+    wrong, and MeasuredError without the program or without any material; no file is changed then.
     """
     job = start_measured_library(folder, blend, model, representation)
     try:

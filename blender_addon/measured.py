@@ -5,12 +5,13 @@ The program brdfc reads the file and fits the models.
 """
 
 import json
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import bpy
 
-from .common.i18n import say
+from .common.i18n import in_percent, say
 from .common.program import ToolJob
 from .packs import pack
 
@@ -26,6 +27,16 @@ class MeasuredError(RuntimeError):
 
 
 @dataclass(frozen=True)
+class Turned:
+    """How close a model comes once the data are turned about the normal."""
+
+    #: Radians, counted from x to y.
+    angle: float
+    #: As Fit.error.
+    error: float
+
+
+@dataclass(frozen=True)
 class Fit:
     """A model fitted to a measured BRDF."""
 
@@ -37,6 +48,48 @@ class Fit:
     error: float
     #: The share of a white world's light that the model's ideal mirror reflects: no data hold it.
     mirror: float
+    #: Parameters whose search ended at the end of their range, beyond which others might be better.
+    stopped: tuple
+    #: Set where data with a direction would have to be turned for a model that has no rotation, and
+    #: it would come much closer then.
+    turned: Turned | None
+
+    @classmethod
+    def of_json(cls, entry):
+        return cls(
+            entry["model"],
+            _values(entry),
+            tuple(entry["matte"]) if entry["matte"] else None,
+            entry["error"],
+            entry["mirror"],
+            tuple(entry["stopped"]),
+            Turned(**entry["turned"]) if entry["turned"] else None,
+        )
+
+    def remarks(self):
+        """What `stopped` and `turned` tell, a sentence each."""
+        said = []
+        if self.stopped:
+            known = pack.model(self.model).parameters
+            # This extension may have been built without some of them.
+            labels = (known.get(name, {}).get("label", name) for name in self.stopped)
+            said.append(
+                say(
+                    "The fit stopped at the end of the range of {parameters}: values beyond it "
+                    "might come closer",
+                    parameters=", ".join(labels),
+                )
+            )
+        if self.turned:
+            said.append(
+                say(
+                    "The error would be {percent} % if the data were turned by {angle} degrees "
+                    "about the normal",
+                    percent=in_percent(self.turned.error),
+                    angle=f"{math.degrees(self.turned.angle):.1f}",
+                )
+            )
+        return said
 
 
 @dataclass(frozen=True)
@@ -81,15 +134,7 @@ class Measured:
     def of_json(cls, path, told):
         """What `brdfc measured --json` prints. Raises MeasuredError without any fit."""
         fits = tuple(
-            Fit(
-                entry["model"],
-                _values(entry),
-                tuple(entry["matte"]) if entry["matte"] else None,
-                entry["error"],
-                entry["mirror"],
-            )
-            for entry in told["fits"]
-            if entry["model"] in pack.model_names()
+            Fit.of_json(entry) for entry in told["fits"] if entry["model"] in pack.model_names()
         )
         sums = tuple(
             LobeSum(

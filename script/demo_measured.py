@@ -14,7 +14,6 @@ earlier runs with the same inputs and programs are kept.
 """
 
 import argparse
-import html
 import os
 import subprocess
 import sys
@@ -26,6 +25,7 @@ from demo_matrix import RENDER_SCENE
 from demo_tasks import Task, TaskError, digest, run_task, write_json
 from markdown_table import percent
 from measured_samples import MADE, make_files
+from pages import page
 from pictures import read_rgb
 
 #: Pixels of a picture; samples a pixel in Blender, which denoises, and of the reference.
@@ -229,18 +229,6 @@ class Demo:
 
 # ---- page --------------------------------------------------------------------------------------
 
-STYLE = """
-:root { color-scheme: light dark; }
-body { margin: 2rem auto; padding: 0 1.5rem; max-width: 70rem;
-  font: 16px/1.5 system-ui, sans-serif; }
-table { border-collapse: collapse; width: 100%; table-layout: fixed; font-size: .9rem; }
-th, td { padding: .35rem .5rem; text-align: left; vertical-align: top; overflow-wrap: anywhere; }
-tr { border-bottom: 1px solid #8884; }
-th:first-child { width: 9rem; }
-p { max-width: 52rem; }
-img { display: block; width: 100%; }
-code { font-size: .85em; }
-"""
 OSL = {True: "Open Shading Language on", False: "Open Shading Language off"}
 
 
@@ -254,61 +242,50 @@ def write_png(exr):
     return png
 
 
-def section(demo):
+def of_page(demo):
+    """What the page says of a file; names of pictures are relative to the page."""
+
     def source(path):
-        return html.escape(path.relative_to(demo.options.out).as_posix())
+        return path.relative_to(demo.options.out).as_posix()
 
-    def image(path, text):
-        return f'<img src="{source(path)}" alt="{html.escape(text)}">'
+    def picture(name, osl):
+        return {
+            "picture": source(demo.picture(name, osl).with_suffix(".png")),
+            "seconds": demo.first_pixel(name, osl),
+            "difference": source(demo.difference(name, osl)),
+        }
 
-    def row(title, cells, tag="td"):
-        return f"<tr><th>{title}</th>" + "".join(f"<{tag}>{c}</{tag}>" for c in cells) + "</tr>\n"
-
-    facts = [f"{demo.kind}.", *demo.told["notes"], *demo.told["lacks"]]
-    rows = [row("", ["Data", *FITS.values()], "th")]
-    rows.append(row("Misplaced light", ["", *(percent(demo.misplaced[n]) for n in FITS)]))
-    for osl, words in OSL.items():
-        cells = [image(demo.folder / "data.png", "the data") + "<small>reference renderer</small>"]
-        differences = [""]
-        for name in FITS:
-            picture = image(demo.picture(name, osl).with_suffix(".png"), f"{name}, {words}")
-            after = f"<small>first pixel after {demo.first_pixel(name, osl):.1f} s</small>"
-            cells.append(picture + after)
-            text = f"difference of {name}, {words}"
-            differences.append(image(demo.difference(name, osl), text))
-        rows += [row(words, cells), row("Difference", differences)]
-    models = (
-        "<br>".join(f"{model} <code>{html.escape(values)}</code>" for model, values in text)
-        for text in (text_of(demo.materials[name], 8) for name in FITS)
-    )
-    rows.append(row("Models", ["", *models]))
-    return (
-        f"<h2>{html.escape(demo.file.name)}</h2>\n<p>{html.escape(demo.about)}. "
-        f"{html.escape(' '.join(facts))}</p>\n<table>\n{''.join(rows)}</table>\n"
-    )
+    return {
+        "name": demo.file.name,
+        "about": demo.about,
+        "facts": [f"{demo.kind}.", *demo.told["notes"], *demo.told["lacks"]],
+        "data": source(demo.folder / "data.png"),
+        "fits": [
+            {
+                "name": name,
+                "title": title,
+                "misplaced": demo.misplaced[name],
+                "pictures": [picture(name, osl) for osl in OSL],
+                "models": text_of(demo.materials[name], 8),
+            }
+            for name, title in FITS.items()
+        ],
+    }
 
 
 def write_page(demos, out):
-    blender = next(iter(demos[0].pictures.values()))["blender"]
-    text = f"""<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><title>Measured materials</title>
-<meta name="viewport" content="width=device-width">
-<style>{STYLE}</style></head><body>
-<h1>Measured materials</h1>
-<p>Each file is rendered from its data by the reference renderer, and in Blender with what is fitted
-to the data: the formula that comes closest, with matte light beside it; curves, which are the model
-<code>factors</code>; and a sum of up to {MOST_LOBES} lobes. Misplaced light is the part of the
-reflected light that the fit sends in other directions than the data do.</p>
-<p>The first pixel is there after <code>brdfc measured</code> has read the file and fitted all
-formulas, the curves or the lobes, and Blender has loaded the scene and rendered one sample. Blender
-is open by then. Its pictures are denoised. Differences are red where Blender is brighter than the
-data and blue where it is darker, in full colour at {percent(DIFFERENCE_SCALE)} of the mean.</p>
-{"".join(section(demo) for demo in demos)}
-<p><small>Blender {html.escape(blender)}; {html.escape(demos[0].processor)}; {SPP} samples a pixel,
-the reference {REFERENCE_SPP}.</small></p>
-</body></html>
-"""
-    (out / "index.html").write_text(text, encoding="utf-8")
+    page.write_page(
+        out,
+        "measured.html.j2",
+        files=[of_page(demo) for demo in demos],
+        modes=list(OSL.values()),
+        blender=next(iter(demos[0].pictures.values()))["blender"],
+        processor=demos[0].processor,
+        most_lobes=MOST_LOBES,
+        difference_scale=DIFFERENCE_SCALE,
+        spp=SPP,
+        reference_spp=REFERENCE_SPP,
+    )
 
 
 def write_sheet(demos, file):

@@ -58,6 +58,9 @@ class MeasuredLibrary:
     #: What was assumed or repaired of a file, and what its data lack, by file: those of
     #: Measured.notes. Files of which there is nothing to say are left out.
     notes: dict
+    #: What keeps the model of a material from coming closer, by file: what Fit.remarks() says.
+    #: Files of which there is nothing to say are left out.
+    remarks: dict
 
 
 class Making(Job):
@@ -135,8 +138,15 @@ class Making(Job):
         names = self._names()
         made = {path: names[path] for path in self._found if path not in self._refusals}
         notes = {path: self._found[path].notes for path in made if self._found[path].notes}
-        self.result = MeasuredLibrary(self._blend, self._catalogs, made, self._refusals, notes)
+        remarks = {path: said for path in made if (said := self._remarks(self._found[path]))}
+        self.result = MeasuredLibrary(
+            self._blend, self._catalogs, made, self._refusals, notes, remarks
+        )
         return None
+
+    def _remarks(self, found):
+        """Of the fit that becomes the material."""
+        return () if self._model == SUM else tuple(found.fit(self._model).remarks())
 
     def _nothing(self):
         more = "; ".join(f"{path.name}: {why}" for path, why in self._refusals.items())
@@ -173,7 +183,7 @@ class Making(Job):
                 "model": self._model,
                 "representation": self._representation,
                 "catalog_id": ids[catalogs[path]],
-                "description": _description(found),
+                "description": _description(found, self._remarks(found)),
                 "tags": [MEASURED.lower(), found.format],
             }
             for path, found in self._found.items()
@@ -189,11 +199,11 @@ class Making(Job):
                 job.cancel()
 
 
-def _description(found):
-    """Of an asset. What the data lack stands before what was assumed of them, as far as there is
-    room."""
+def _description(found, remarks=()):
+    """Of an asset. What the data lack stands before what was assumed of them and remarks on the
+    fit, as far as there is room."""
     said = f"{found.path.name}: {found.format}, {found.grid}"
-    for note in (*found.told["lacks"], *found.told["notes"]):
+    for note in (*found.told["lacks"], *found.told["notes"], *remarks):
         longer = f"{said}; {note}"
         if len(longer) <= _DESCRIPTION:
             said = longer

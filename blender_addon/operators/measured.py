@@ -22,7 +22,10 @@ MEASURED_BLEND = "measured.blend"
 OFFERED = 8
 
 
-def _assign(operator, context, material):
+def _assign(operator, context, found, model=None):
+    material = api.new_measured_material(found, model)
+    for said in () if model == SUM else found.fit(model).remarks():
+        operator.report({"INFO"}, rpt(said))
     target = context.object
     target.active_material = material  # Blender adds a slot if there is none
     said = say("{material} assigned to {object}", material=material.name, object=target.name)
@@ -76,7 +79,7 @@ class BRDFC_OT_new_measured_material(ModalJob, Operator):
         if getattr(self, "browsed", False):
             return bpy.ops.brdfc.new_measured_material("INVOKE_DEFAULT", filepath=self.filepath)
         try:
-            _assign(self, context, api.new_measured_material(self.filepath))
+            _assign(self, context, api.measured_fits(self.filepath))
         except ERRORS as error:
             return refused(self, error)
         return {"FINISHED"}
@@ -221,16 +224,19 @@ class BRDFC_OT_choose_measured(Operator):
                 wrapped(self.layout.column(align=True), part, pixels=480)
             return
         fit = self.found.fit(self.model)
+        said = fit.remarks()
         if fit.matte:
             grey = sum(fit.matte) / 3
-            said = say(
-                "A matte surface that reflects {percent} % is added", percent=in_percent(grey)
+            said.insert(
+                0,
+                say("A matte surface that reflects {percent} % is added", percent=in_percent(grey)),
             )
-            wrapped(self.layout.column(align=True), said, pixels=480)
+        for line in said:
+            wrapped(self.layout.column(align=True), line, pixels=480)
 
     def execute(self, context):
         try:
-            _assign(self, context, api.new_measured_material(self.found, self.model))
+            _assign(self, context, self.found, self.model)
         except ERRORS as error:
             return refused(self, error)
         return {"FINISHED"}

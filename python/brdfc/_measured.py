@@ -53,6 +53,16 @@ def _json(*arguments: str):
 
 
 @dataclass(frozen=True)
+class Turned:
+    """How close a model comes once the data are turned about the normal."""
+
+    #: Radians, counted from x to y.
+    angle: float
+    #: As Fit.error.
+    error: float
+
+
+@dataclass(frozen=True)
 class Fit:
     """A model that comes close to a measured BRDF."""
 
@@ -64,6 +74,11 @@ class Fit:
     error: float
     #: Share of a white world's light that the model's ideal mirror reflects: no data hold it.
     mirror: float
+    #: Parameters whose search ended at the end of their range, beyond which others might be better.
+    stopped: tuple[str, ...]
+    #: Set where data with a direction would have to be turned for a model that has no rotation, and
+    #: it would come much closer then.
+    turned: Turned | None
 
 
 @dataclass(frozen=True)
@@ -127,7 +142,15 @@ class Measured:
         Lambert surface may be added to those that have none."""
         options = ["--models", ",".join(models) or "all", *([] if matte else ["--no-matte"])]
         return [
-            Fit(f["model"], _values(f), _plain(f["matte"]), f["error"], f["mirror"])
+            Fit(
+                f["model"],
+                _values(f),
+                _plain(f["matte"]),
+                f["error"],
+                f["mirror"],
+                tuple(f["stopped"]),
+                Turned(**f["turned"]) if f["turned"] else None,
+            )
             for f in _json(self.path, *options)["fits"]
         ]
 

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import jinja2
+from markdown_table import percent
 from markupsafe import Markup
 
 MINUS, DASH = "−", "–"
@@ -55,6 +56,7 @@ def environment():
         "number": number,
         "fixed": fixed,
         "counted": counted,
+        "percent": percent,
     }
     made.globals |= {"dash": DASH, "minus": MINUS}
     return made

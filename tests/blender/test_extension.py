@@ -1287,7 +1287,8 @@ def test_the_page_says_what_scripts_are_given(extension):
     rows = dict(re.findall(r"^\| (.*) \| (`.*) \|$", page.split("### What they return")[1], re.M))
     said = {of: re.findall(r"`(\w+)`", has) for of, has in rows.items()}
     convert = import_module(f"{extension.package}.convert")
-    for kind in (extension.api.Finding, extension.api.Lamp, extension.api.Update, convert.Plan):
+    api = extension.api
+    for kind in (api.Finding, api.Lamp, api.Update, api.MeasuredLibrary, convert.Plan):
         (of,) = (of for of in said if of.endswith(f": `{kind.__name__}`"))
         assert said[of] == [field.name for field in dataclasses.fields(kind)]
     for model in extension.api.models().values():

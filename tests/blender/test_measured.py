@@ -8,6 +8,7 @@ import math
 import os
 import subprocess
 from importlib import import_module
+from types import SimpleNamespace
 
 import bpy
 import helpers
@@ -353,6 +354,79 @@ def test_the_operator_makes_the_closest(extension, empty, paint, found, monkeypa
     handler = bpy.types.FileHandler.bl_rna_get_subclass_py("BRDFC_FH_measured")
     assert handler.bl_import_operator == "brdfc.new_measured_material"
     assert handler.bl_file_extensions == ".binary;.bsdf;.bin;.alta;.dat;.xml"
+
+
+@pytest.fixture(scope="module")
+def wide(extension, write_table):
+    """What is found where facets face everywhere: the highlight of any Beckmann slope up to 1 is
+    narrower."""
+    path = write_table("wide.csv", "microfacet", ax=1.0, ay=1.0, distribution="ggx")
+    return fitted(extension, path, "cook_torrance")
+
+
+@pytest.fixture(scope="module")
+def brushed(extension, tmp_path_factory):
+    """What is found where a highlight lies along a tangent that is turned by 30 degrees."""
+    formulas = import_module(f"{extension.package}.brdfc")
+    angles, azimuths = [0, 15, 30, 45, 60, 75, 85], range(0, 360, 30)
+    grid = np.array(list(itertools.product(angles, azimuths, angles, azimuths)), float)
+    wi, wo = (direction(grid[:, k], grid[:, k + 1] - 30) for k in (0, 2))
+    f = formulas.model("ward").eval(wi, wo, ks=0.3, ax=0.2, ay=0.6)
+    path = tmp_path_factory.mktemp("measured") / "brushed.csv"
+    header = "theta_i,phi_i,theta_o,phi_o,r,g,b"
+    np.savetxt(path, np.hstack([grid, f]), "%.6g", ",", header=header, comments="")
+    return fitted(extension, path, "ward")
+
+
+def fitted(extension, path, model):
+    """One model is fitted in a second."""
+    return import_module(f"{extension.package}.measured").Fitting(path, model, sums=False).wait()
+
+
+def test_a_fit_says_what_keeps_it_from_coming_closer(wide, brushed, found):
+    narrow, straight = wide.fit("cook_torrance"), brushed.fit("ward")
+    assert narrow.stopped == ("m",) and narrow.turned is None
+    assert narrow.remarks() == [
+        "The fit stopped at the end of the range of Slope: values beyond it might come closer"
+    ]
+    assert straight.stopped == () and straight.turned.error < 0.7 * straight.error
+    assert math.degrees(straight.turned.angle) == pytest.approx(-30, abs=1)
+    (said,) = straight.remarks()
+    percent = f"{100 * straight.turned.error:.2g} %"
+    degrees = f"{math.degrees(straight.turned.angle):.1f} degrees"
+    assert said == (
+        f"The error would be {percent} if the data were turned by {degrees} about the normal"
+    )
+    fine = found.fit("ward")
+    assert fine.stopped == () and fine.turned is None and fine.remarks() == []
+
+
+def test_the_dialog_and_the_message_say_it(extension, empty, monkeypatch, wide, brushed):
+    operators = import_module(f"{extension.package}.operators.measured")
+    operator = operators.BRDFC_OT_choose_measured
+    item = helpers.add_sphere(empty, None)
+    bpy.context.view_layer.objects.active = item
+    for data in (wide, brushed):
+        (fit,) = data.fits
+        (said,) = fit.remarks()
+        layout, reports = helpers.Layout(), []
+        told = SimpleNamespace(
+            layout=layout,
+            found=data,
+            model=fit.model,
+            report=lambda kind, text, reports=reports: reports.append((kind, text)),
+        )
+        operator.draw(told, bpy.context)
+        assert said in " ".join(layout.log)
+        assert operator.execute(told, bpy.context) == {"FINISHED"}
+        assert ({"INFO"}, str(said)) in reports
+        assert reports[-1][1] != said
+    # Without a dialog, too.
+    monkeypatch.setattr(extension.api, "measured_fits", lambda path: brushed)
+    reports = []
+    told = SimpleNamespace(filepath="x", report=lambda kind, text: reports.append(text))
+    assert operators.BRDFC_OT_new_measured_material.execute(told, bpy.context) == {"FINISHED"}
+    assert str(said) in reports
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 """A folder of measured BRDFs as an asset catalogue."""
 
 import itertools
+import json
 import os
 import re
 import sys
@@ -31,6 +32,20 @@ def write(path, red, green, blue):
     ]
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("theta_i,phi_i,theta_o,phi_o,r,g,b\n" + "\n".join(rows) + "\n")
+
+
+def write_wide(path, formulas):
+    """A table of facets that face everywhere: any slope up to 1 makes a narrower highlight."""
+    angles = range(0, 90, 10)
+    grid = np.array(list(itertools.product(angles, [0], angles, range(0, 181, 10))), float)
+    (ti, pi), (to, po) = np.radians(grid[:, :2]).T, np.radians(grid[:, 2:]).T
+    wi, wo = (
+        np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1)
+        for t, p in ((ti, pi), (to, po))
+    )
+    f = formulas.model("microfacet").eval(wi, wo, ax=1.0, ay=1.0, distribution="ggx")
+    header = "theta_i,phi_i,theta_o,phi_o,r,g,b"
+    np.savetxt(path, np.hstack([grid, f]), "%.9g", ",", header=header, comments="")
 
 
 @pytest.fixture(scope="module")
@@ -131,6 +146,28 @@ def test_a_folder_becomes_a_catalogue(
     again = extension.api.new_measured_library(folder, blend, "lambert")
     assert again.materials == made.materials and cats.read_text() == text
     assert blend.read_bytes() == bytes_before
+
+
+def test_what_keeps_a_model_from_coming_closer(extension, module, tmp_path, monkeypatch):
+    """Of each file, and in the description of its asset. The second Blender is replaced."""
+    data = tmp_path / "data"
+    data.mkdir()
+    write_wide(data / "wide.csv", import_module(f"{extension.package}.brdfc"))
+    blend, listed = tmp_path / "measured.blend", tmp_path / "listed.json"
+    script = (
+        "import pathlib, shutil, sys; folder = pathlib.Path(sys.argv[2]);"
+        "shutil.copy(sys.argv[3], sys.argv[1]); (folder / 'materials.blend').write_bytes(b'x');"
+        "(folder / 'refusals.json').write_text('{}')"
+    )
+    command = [sys.executable, "-c", script, str(listed)]
+    monkeypatch.setattr(module, "build_command", lambda *arguments: [*command, *arguments])
+    made = extension.api.new_measured_library(data, blend, "cook_torrance")
+    (said,) = made.remarks[data / "wide.csv"]
+    assert said.startswith("The fit stopped at the end of the range of Slope")
+    (entry,) = json.loads(listed.read_text(encoding="utf-8"))
+    assert entry["description"].endswith(f"; {said}")
+    blend.unlink()
+    assert extension.api.new_measured_library(data, blend, "lambert").remarks == {}
 
 
 def test_the_part_done_never_falls(module, folder, tmp_path, monkeypatch):
@@ -251,7 +288,9 @@ def test_a_file_that_is_no_library_is_not_replaced(extension, empty, folder, tmp
 def test_what_an_asset_is_described_by_is_short(module, tmp_path):
     told = {"lacks": ["a" * 100, "b" * 300], "notes": ["c" * 100, "d" * 200]}
     found = SimpleNamespace(path=tmp_path / "x.csv", format="CSV", grid="2 x 2", told=told)
-    assert module._description(found) == f"x.csv: CSV, 2 x 2; {'a' * 100}; {'c' * 100}"
+    said = f"x.csv: CSV, 2 x 2; {'a' * 100}; {'c' * 100}"
+    assert module._description(found) == said
+    assert module._description(found, ["e" * 90]) == f"{said}; {'e' * 90}"
 
 
 def test_a_folder_of_which_no_file_can_be_read(extension, empty, tmp_path):

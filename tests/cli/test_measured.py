@@ -1228,3 +1228,35 @@ print(json.dumps([data.format, data.isotropic, data.eval(wi, wo).tolist(), f.tol
         environment["BRDFC_TOOL"] = tool
         done = subprocess.run(command, capture_output=True, text=True, env=environment)
         assert f"FileNotFoundError: {expected}" in done.stderr, done.stderr
+
+
+@pytest.mark.slow
+def test_the_package_says_what_keeps_a_model_from_coming_closer(tmp_path, package):
+    """Facets that face everywhere, and a highlight along a tangent that is turned."""
+    wide, brushed = tmp_path / "wide.csv", tmp_path / "brushed.csv"
+    angles = range(0, 90, 10)
+    ti, pi, to, po = grid(angles, [0], angles, range(0, 181, 10))
+    model = ["eval", "microfacet", "ax=1", "ay=1", "distribution=ggx"]
+    f = eval_pairs(model, vector(ti, pi), vector(to, po))[:, :3]
+    wide.write_text(angle_table(ti, pi, to, po, *f.T), encoding="utf-8")
+    ti, pi, to, po = grid(range(0, 90, 15), range(0, 360, 30), range(0, 90, 15), range(0, 360, 30))
+    model = ["eval", "ward", "ax=0.2", "ay=0.6"]
+    f = eval_pairs(model, vector(ti, pi - 30), vector(to, po - 30))[:, :3]
+    brushed.write_text(angle_table(ti, pi, to, po, *f.T), encoding="utf-8")
+    script = """
+import dataclasses, json, sys, brdfc
+fits = [brdfc.measured(f).fit(m) for f, m in zip(sys.argv[1::2], sys.argv[2::2])]
+print(json.dumps([dataclasses.asdict(fit) for fit in fits]))
+"""
+    environment = {"PYTHONPATH": str(package), "BRDFC_TOOL": TOOL, "PATH": ""}
+    command = [sys.executable, "-c", script, wide, "cook_torrance", brushed, "ward"]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment)
+    assert done.returncode == 0, done.stderr
+    narrow, straight = json.loads(done.stdout)
+    assert narrow["stopped"] == ["m"] and narrow["turned"] is None
+    assert straight["stopped"] == []
+    assert straight["turned"]["angle"] == pytest.approx(np.radians(-30), abs=0.02)
+    assert straight["turned"]["error"] < 0.7 * straight["error"]
+    for file, fit in ((wide, narrow), (brushed, straight)):
+        said = json.loads(run("measured", file, "--json", "--models", fit["model"]).stdout)
+        assert {key: said["fits"][0][key] for key in fit} == fit

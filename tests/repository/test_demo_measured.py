@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The demonstration of measured materials: the files that it makes, its page, and wrong usage."""
 
+import html
 import json
 import re
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import demo_measured
 import measured_samples
@@ -98,6 +100,28 @@ def test_files_that_are_not_measured_are_refused(tmp_path, demo):
     assert done.returncode == 2 and "bad.csv" in done.stderr
     done = demo(bad, other)
     assert done.returncode == 2 and "expected files of different names, got bad" in done.stderr
+
+
+def test_a_page_of_a_file_of_any_name(tmp_path):
+    """Addresses of pictures lead to them, and texts are shown as they are."""
+    options = SimpleNamespace(out=tmp_path)
+    demo = demo_measured.Demo.__new__(demo_measured.Demo)
+    demo.options, demo.file, demo.folder = options, tmp_path / "a & #1.csv", tmp_path / "a & #1"
+    demo.about, demo.kind, demo.processor = "Paint <wet>", "CSV", "x86"
+    demo.told = {"notes": ["a < b."], "lacks": []}
+    demo.materials = dict.fromkeys(
+        demo_measured.FITS, {"model": "lambert", "parameters": {"rho": 0.5}}
+    )
+    demo.misplaced, demo.seconds = (dict.fromkeys(demo_measured.FITS, x) for x in (0.123, 2))
+    record = {"load_wall_seconds": 1, "one_sample_wall_seconds": 0.5, "blender": "4.5"}
+    demo.pictures = {(name, osl): record for name in demo_measured.FITS for osl in (True, False)}
+    demo_measured.write_page([demo], tmp_path)
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert len(set(re.findall(r'src="a%20%26%20%231/[\w.-]+"', page))) == 1 + 4 * 3
+    assert page.count("src=") == 2 * (1 + 2 * 3)
+    text = html.unescape(re.sub("<[^>]*>", "", page))
+    for said in ("a & #1.csv", "Paint <wet>. CSV. a < b.", "12 %", "first pixel after 3.5 s"):
+        assert said in text, said
 
 
 @pytest.mark.long
