@@ -160,6 +160,11 @@ template <class T> Against<T> against(const LampPatch<T>& patch, const Vec3<T>& 
   return {select(on, T(1), T(0)), select(moves, T(1), T(0)), select(moves, moved, drawn)};
 }
 
+/// Lower bound of the lobe's profile by which AimedLamp::emphasis is divided. Where a part of a lamp shines, f is
+/// averaged over a shape that reaches a little over the edge of that part, and a lobe that is narrow for other lamps
+/// falls to 0 there.
+inline constexpr double kLeastProfile = 0.25;
+
 /// Aims a closure at a lamp. `shining`: the mean of its lit_part(), or the lamp itself. `room`: see room_beside(). v1,
 /// v2: numbers in [0, 1) that choose a point of `shining`.
 template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const LampPatch<T>& shining, const T& room,
@@ -209,7 +214,7 @@ template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const LampPatc
   // Divide by the lobe: by its profile at the point, which is even about the lamp's centre, but by the mean cosine over
   // the whole lamp. If the cosine at the point were used as well, f and the cosine of the point where light sampling
   // hits the lamp would be correlated wrongly, and the average would not be f.
-  const T profile = profile_of(lamp.lobe, dot(towards, lamp.wi));
+  const T profile = maximum(profile_of(lamp.lobe, dot(towards, lamp.wi)), T(kLeastProfile));
   lamp.emphasis = select(usable, density(point) * rise / maximum(profile * mean_rise, tiny<T>()), T(0));
   return lamp;
 }
@@ -248,7 +253,7 @@ AimedLamp<T> cut_off(AimedLamp<T> lamp, const LampPatch<T>& shining, const Vec3<
   const T mean_rise = turns[2] / T(2 * kSteps);
   lamp.wi = normalize(Vec3<T>{turns[3], turns[4], turns[5]});
   const T rise = dot(lamp.lobe.half, lamp.lobe.towards);
-  const T profile = profile_of(lamp.lobe, dot(lamp.lobe.towards, lamp.wi));
+  const T profile = maximum(profile_of(lamp.lobe, dot(lamp.lobe.towards, lamp.wi)), T(kLeastProfile));
   // If the lobe's normal lies below the plane, the lobe is black everywhere above it.
   const auto shows = lamp.emphasis > T(0) && mean_rise > T(0) && dot(lamp.lobe.half, normal) > T(0);
   lamp.emphasis = select(shows, turns[6] * rise / maximum(profile * mean_rise, tiny<T>()), T(0));

@@ -99,8 +99,8 @@ template <class T> struct LampBeam {
 template <class T> struct LitPart {
   LampPatch<T>
       lamp;  ///< bounds of the part that may shine here; the rest of the lamp is treated like any other direction
-  /// The rectangle that f is averaged over: it has the same centre and variances as the light. With half axes of 0 the
-  /// lamp does not shine here.
+  /// The rectangle or, for a disk, the ellipse that f is averaged over: it has the same centre and variances as the
+  /// light. With half axes of 0 the lamp does not shine here.
   LampPatch<T> mean;
 };
 template <class T> LitPart<T> lit_part(const LampPatch<T>& patch, const LampBeam<T>& beam) {
@@ -138,15 +138,19 @@ template <class T> LitPart<T> lit_part(const LampPatch<T>& patch, const LampBeam
               });
   const auto lit = sums[2] > T(0);
   const T all = select(lit, sums[2], T(1)), x = sums[3] / all, y = sums[4] / all;
-  // Each sample stands for a grid cell, whose own variance is a twelfth of its squared width.
+  // Each sample stands for a grid cell, whose own variance is a twelfth of its squared width. The squared half axis is
+  // three times the variance over a rectangle, and four times that over an ellipse. A rectangle of the variances of a
+  // disk would have corners outside of it, and of a lobe that is narrow for other lamps.
+  const T times = select(patch.disk > T(0.5), T(4), T(3));
   const auto half = [&](const T& square, const T& mean, const T& step) {
-    return select(lit, sqrt(maximum(T(3) * (square / all - sqr(mean)), T(0)) + sqr(step) / T(4)), T(0));
+    return select(lit, sqrt(times * (maximum(square / all - sqr(mean), T(0)) + sqr(step) / T(12))), T(0));
   };
   const T half_x = (xs[1] - xs[0]) / T(2), half_y = (ys[1] - ys[0]) / T(2);
   const auto whole = half_x + half_y >= T(2);
-  return {{patch.at((xs[0] + xs[1]) / T(2), (ys[0] + ys[1]) / T(2)), patch.across * half_x, patch.along * half_y,
-           select(whole, patch.disk, T(0))},
-          {patch.at(x, y), patch.across * half(sums[5], x, step_x), patch.along * half(sums[6], y, step_y), T(0)}};
+  return {
+      {patch.at((xs[0] + xs[1]) / T(2), (ys[0] + ys[1]) / T(2)), patch.across * half_x, patch.along * half_y,
+       select(whole, patch.disk, T(0))},
+      {patch.at(x, y), patch.across * half(sums[5], x, step_x), patch.along * half(sums[6], y, step_y), patch.disk}};
 }
 
 }  // namespace brdfc::forms

@@ -164,8 +164,8 @@ template <class T> struct SpotCone {
     constexpr double kEven = 1.2;
     // Of the brightest direction. Where less of the cone shines, errors of the mean could be larger than the mean.
     constexpr double kLeast = 1.0 / 50;
-    const T chord2 = sqr(chord), middle = cosine * (T(1) - chord2 / T(4)) - edge, bent = cosine * (chord2 / T(12));
-    const T spread = sqrt((T(1) - sqr(cosine)) * chord2 * (T(1) - chord2 / T(4)));
+    const T chord2 = sqr(chord), middle = middle_of(cosine, chord2), bent = cosine * (chord2 / T(12));
+    const T spread = spread_of(cosine, chord2);
     // Where the light fades over more than the cone: Gauss and Chebyshev's rule of the second kind, with three points.
     const T aside = spread * T(std::sqrt(0.5));
     const T beside = smoothstep(middle - bent + aside) + smoothstep(middle - bent - aside);
@@ -178,7 +178,20 @@ template <class T> struct SpotCone {
     return select(is_spot, maximum(mean, smoothstep(middle + spread) * T(kLeast)), T(1));
   }
 
+  /// 1 if any part of the cone shines on the shading point, otherwise 0; 1 for other lamps.
+  T is_lit(const T& cosine, const T& chord2) const {
+    const auto lit = T(0) < middle_of(cosine, chord2) + spread_of(cosine, chord2);
+    return select(is_spot, select(lit, T(1), T(0)), T(1));
+  }
+
  private:
+  /// Over a cone of directions, the cosine of the angle to the spot's axis varies by `spread` to both sides of
+  /// `middle`, with about the density of a semicircle.
+  T middle_of(const T& cosine, const T& chord2) const { return cosine * (T(1) - chord2 / T(4)) - edge; }
+  T spread_of(const T& cosine, const T& chord2) const {
+    return sqrt((T(1) - sqr(cosine)) * chord2 * (T(1) - chord2 / T(4)));
+  }
+
   /// 0 up to x = 0 and 1 from x = fade on.
   T smoothstep(const T& x) const {
     const T t = maximum(minimum(x / fade, T(1)), T(0));

@@ -104,7 +104,9 @@ NodeProgram record_cone() {
     p.output("inner", cone.inner);
     p.output("flat", cone.flat);
     p.output("used", cone.used);
-    p.output("active", cone.active * lit.is_lit);
+    // A lamp that does not shine here would take the light of others from the directions of its cone.
+    const Expr spot_lit = spot_cone(slot_input()).is_lit(dot(input3("away"), cone.aim), cone.of_cones / Expr(kPi));
+    p.output("active", cone.active * lit.is_lit * spot_lit);
     p.output("above", cone.above);
     p.output("layout", cone.cones.layout);
     p.output("clear", cone.clear);

@@ -126,6 +126,27 @@ def one_before_the_other(scene):
     add_lamp(scene, "POINT", "Beside", (-2.5, -4.2, 2.8), energy=300, shadow_soft_size=0.0)
 
 
+def half_lit(scene, name, x, turned):
+    add_lamp(
+        scene, "SPOT", name, (x, -4, 3), (0.93, 0, -0.46 + turned), energy=600,
+        shadow_soft_size=0.25, spot_size=0.5,
+    )  # fmt: skip
+
+
+def a_spot_behind_one_turned_away(scene):
+    """The one turned away would take all light from its cone if it counted."""
+    half_lit(scene, "Spot", -2.0, 0.1)
+    add_lamp(
+        scene, "SPOT", "Away", (-1.4, -3, 2.2), (0.93 + math.pi, 0, -0.46), energy=600,
+        shadow_soft_size=0.25, spot_size=0.5,
+    )  # fmt: skip
+
+
+def spots_beside_each_other(scene):
+    half_lit(scene, "Left", -2.0, 0.1)
+    half_lit(scene, "Right", -1.7, -0.1)
+
+
 def blocks_of(extension, model, values, form, light, samples, pictures=6):
     """Means of blocks of pixels, one picture per row: (pictures, blocks)."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
@@ -189,7 +210,9 @@ def window_and_sun(scene, turned=0.0, shape="SQUARE"):
 @pytest.mark.full
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(
-    "light", [lamps, flat_lamps, one_before_the_other, window_and_sun], ids=lambda f: f.__name__
+    "light",
+    [lamps, flat_lamps, one_before_the_other, window_and_sun, a_spot_behind_one_turned_away],
+    ids=lambda f: f.__name__,
 )
 @pytest.mark.parametrize(("model", "values"), CASES)
 def test_lamps(extension, model, values, light):
@@ -205,6 +228,14 @@ def test_lamps(extension, model, values, light):
     print(f"{model}: {100 * off:+.2f} ± {100 * error:.2f} %, blocks {noise:.2f}")
     assert abs(off) < 4.5 * error + 5e-3
     assert noise < 2.0
+
+
+@pytest.mark.parametrize("model", ["ward", "oren_nayar"])
+def test_no_dot_under_spots_beside_each_other(extension, model):
+    """In Open Shading Language a lobe that is narrow because of another lamp was divided by 0 at
+    points beside it: dots of 1e25."""
+    found = blocks_of(extension, model, {}, "aimed", spots_beside_each_other, 64)
+    assert np.abs(found).max() < 100 * np.median(found[found > 0.02 * found.mean()])
 
 
 @pytest.mark.long

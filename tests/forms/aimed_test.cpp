@@ -242,7 +242,7 @@ TEST(Aimed, ASlopeOverTheLampIsNotCountedTwice) {
 /// visible part.
 TEST(Aimed, AConeBoundsWhatIsAveragedOver) {
   constexpr int kSteps = 64;
-  double worst = 0, worst_whole = 0;
+  double worst = 0, worst_whole = 0, worst_tight = 0;
   for (const auto& [model, values] :
        {std::pair{"phong", "e=20"}, {"radziszewski_alda", "n=4"}, {"oren_nayar", "rho=0.7"}}) {
     const Model& m = find_model(model);
@@ -266,11 +266,12 @@ TEST(Aimed, AConeBoundsWhatIsAveragedOver) {
             // No light is lost.
             EXPECT_NEAR(over_patch(part.lamp, 1, [&](const auto& w) { return meets(lamp, w) ? beam(w) : 0; }), all,
                         0.02 * all);
-            const auto off = [&](const LampPatch<double>& patch, const LampPatch<double>& shining) {
+            const auto off = [&](const LampPatch<double>& patch, const LampPatch<double>& shining, double room = 1) {
               double mean = 0;
               AimedLamp<double> aimed;
               for (int i = 0; i < kSteps * kSteps; ++i) {
-                aimed = aim_at(patch, shining, 1.0, (i / kSteps + 0.5) / kSteps, (i % kSteps + 0.5) / kSteps, wo);
+                aimed = aim_at(patch, shining, room, (i / kSteps + 0.5) / kSteps, (i % kSteps + 0.5) / kSteps, wo);
+                EXPECT_LT(aimed.emphasis, 10);
                 mean += brdf->eval(aimed.wi, wo).g * std::max(aimed.wi.z, 0.0) * aimed.emphasis / (kSteps * kSteps);
               }
               const double lit = over_patch(lamp, 1, [&](const auto& w) { return beam(w) * evaluate(aimed.lobe, w); });
@@ -282,10 +283,13 @@ TEST(Aimed, AConeBoundsWhatIsAveragedOver) {
             EXPECT_LT(found, 0.03) << model << " " << cosTheta_o << " " << angle << " " << blend << " " << aside.x;
             worst = std::max(worst, found);
             worst_whole = std::max(worst_whole, off(lamp, lamp));
+            worst_tight = std::max(worst_tight, off(part.lamp, part.mean, 0));
           }
   }
   EXPECT_GT(worst_whole, 0.1) << "nothing would be wrong without";
-  std::printf("worst %.4f, with the whole lamp %.4f\n", worst, worst_whole);
+  // The lobe is narrow because of another lamp beside it.
+  EXPECT_LT(worst_tight, 0.1);
+  std::printf("worst %.4f, with the whole lamp %.4f, beside another lamp %.4f\n", worst, worst_whole, worst_tight);
 }
 
 /// Lamps that reach below the horizon, from where no lobe receives light: f is averaged over the part above.
