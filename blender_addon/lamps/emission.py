@@ -8,6 +8,10 @@ from ..trees import shader_trees, shader_values
 from . import ies
 
 
+#: The power of a lamp that is dark in this frame and may light up in another one.
+DARK = 1e-9
+
+
 def animated(owner):
     """Whether a data-block is animated itself."""
     data = owner.animation_data
@@ -145,5 +149,5 @@ def of_light(light, extent):
             if shown.node.bl_idname == "ShaderNodeEmission"
         )
     if power == 0 and (animated(light) or (light.node_tree and animated(light.node_tree))):
-        return 1e-9
+        return DARK
     return abs(power)

@@ -381,6 +381,24 @@ def test_a_lamp_that_animation_hides_has_an_empty_slot(ball, empty):
     assert found[0] == found[2] != found[1]
 
 
+def test_lamps_that_are_rendered_in_a_frame_get_slots_before_others(ball, empty, extension):
+    """Of more lamps than slots, those that the frame shows; hidden ones lose no light."""
+    lamps = [add_lamp(empty, "POINT", f"L{i:02}", location=(i, 0, 4)) for i in range(12)]
+    for i, lamp in enumerate(lamps):
+        lamp.data.shadow_soft_size = 0.0
+        lamp.data.energy = 100.0 * (12 - i)
+        for frame in range(1, 7):
+            lamp.hide_render = i // 2 != frame - 1
+            lamp.keyframe_insert("hide_render", frame=frame)
+    for frame in (1, 6, 3):
+        empty.frame_set(frame)
+        listed = extension.api.see_lamps(empty)
+        brightest = {lamp.name for lamp in listed[:2] if lamp.slot}
+        assert brightest == {f"L{2 * frame - 2:02}", f"L{2 * frame - 1:02}"}
+        codes = {finding.code for finding in extension.api.warnings(ball.active_material, empty)}
+        assert "lost_lamps" not in codes
+
+
 def test_undo(ball, empty):
     add_lamp(empty, "POINT", "Key")
     bpy.context.view_layer.update()

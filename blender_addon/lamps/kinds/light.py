@@ -153,13 +153,15 @@ class Light(Kind, ABC):
         # other objects, so that the lobe must carry all of its light.
         sign = 1.0 if has_importance(light) and light.use_shadow else -1.0
         sizeless = self.is_sizeless(light)
+        hidden = item is not None and item.hide_render
+        power = emission.DARK if hidden else self.power(light)
         values = self.slot(light, slots.placed(item, matrix), sign)
         if item is not None and animation.animates(item, "hide_render"):
             values = slots.while_rendered(values, item)
         return slots.Candidate(
             name,
             values,
-            partial(self.irradiance, light, matrix, self.power(light)),
+            partial(self.irradiance, light, matrix, power),
             self.angular_size(light, matrix),
             sizeless=sizeless,
             met=has_importance(light) and not sizeless,
