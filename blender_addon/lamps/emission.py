@@ -7,7 +7,6 @@ from ..common import color
 from ..trees import shader_trees, shader_values
 from . import ies
 
-
 #: The power of a lamp that is dark in this frame and may light up in another one.
 DARK = 1e-9
 
