@@ -4,25 +4,15 @@
 Files of glTF can't hold reflection models. Blender's exporter asks enabled extensions about each
 material."""
 
-from .groups import model_nodes
-from .packs.pack import PackError
 from .plotting import nearest_node
-from .trees import shader_trees
 
 
 class glTF2ExportUserExtension:  # the exporter looks for this name
     """The exporter makes one for each file, and logs what its methods raise."""
 
     def gather_material_hook(self, gltf2_material, blender_material, export_settings):
-        """Fills in a material that is a model's node alone. In others the exporter may have found a
-        Principled node, as below a coat."""
-        shown = [s.node for s in shader_trees.shown(blender_material)] if blender_material else []
-        if len(shown) != 1 or not model_nodes.is_ours(shown[0]):
-            return
-        try:
-            near = nearest_node.of_node(shown[0])
-        except (ValueError, PackError):  # of another version, without this model
-            return
+        """Fills in a material that is a model's node alone."""
+        near = nearest_node.of_material(blender_material)
         if near is not None:
             _fill(gltf2_material, near)
 

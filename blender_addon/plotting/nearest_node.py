@@ -3,6 +3,7 @@
 
 from ..groups import model_nodes
 from ..packs import pack
+from ..trees import shader_trees
 
 
 def values(node):
@@ -19,3 +20,16 @@ def of_node(node):
     from . import plots
 
     return plots.nearest_to(model_nodes.identity(node).model, values(node)[0])
+
+
+def of_material(material):
+    """The same for a material that is a model's node alone; None for others, and where the
+    extension lacks the model. For exporters, which may have found a Principled node in others, as
+    below a coat."""
+    shown = [s.node for s in shader_trees.shown(material)] if material else []
+    if len(shown) != 1 or not model_nodes.is_ours(shown[0]):
+        return None
+    try:
+        return of_node(shown[0])
+    except (ValueError, pack.PackError):  # of another version
+        return None
