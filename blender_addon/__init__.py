@@ -6,7 +6,7 @@ Scripts use `api`: `from bl_ext.user_default.brdfc_shaders import api`.
 
 import bpy
 
-from . import lamps, operators
+from . import lamps, operators, usd
 from .common import enabling, i18n
 from .gltf import glTF2ExportUserExtension as glTF2ExportUserExtension
 from .groups import automatic, choice_sockets, imports, update
@@ -38,11 +38,13 @@ def register():
     imports.register()
     update.register()
     console.register()
+    usd.register()
     enabling.set_registered(True)
 
 
 def unregister():
     enabling.set_registered(False)
+    usd.unregister()
     console.unregister()
     update.unregister()
     imports.unregister()

@@ -504,7 +504,7 @@ def nearest_principled(material, node=None):
     of the light from 45 degrees that the node misplaces, error. None for a black material. Linked
     parameters have their default.
 
-    For exporters that know no other node; that to glTF uses it by itself.
+    For exporters that know no other node; those to glTF and USD use it by themselves.
     """
     near = nearest_node.of_node(_the_node(material, node))
     if near is None:
