@@ -50,6 +50,10 @@ class Nearest:
         return _native(self.roughness, self.metallic, self.ior, self.color)
 
 
+#: The node that reflects nothing, which no search finds.
+BLACK = Nearest(1.0, 0.0, 1.0, (0.0, 0.0, 0.0), np.zeros((0, 3)), 0.0)
+
+
 @dataclass(frozen=True)
 class Shares:
     """Fractions of the light from some views that are ideally reflected, scattered, and ideally

@@ -23,13 +23,17 @@ def of_node(node):
 
 
 def of_material(material):
-    """The same for a material that is a model's node alone; None for others, and where the
-    extension lacks the model. For exporters, which may have found a Principled node in others, as
-    below a coat."""
+    """The same for a material that is a model's node alone, BLACK for a black one; None for others,
+    and where the extension lacks the model. For exporters, which may have found a Principled node
+    in others, as below a coat."""
     shown = [s.node for s in shader_trees.shown(material)] if material else []
     if len(shown) != 1 or not model_nodes.is_ours(shown[0]):
         return None
     try:
-        return of_node(shown[0])
+        near = of_node(shown[0])
     except (ValueError, pack.PackError):  # of another version
         return None
+    # It imports NumPy, as above.
+    from ..nearest.principled import BLACK
+
+    return near or BLACK

@@ -81,6 +81,17 @@ def test_other_materials_are_exported_as_ever(extension, empty, exporter, tmp_pa
     assert "mixed" in bpy.data.materials
 
 
+def test_a_black_material_arrives_black(extension, empty, exporter, tmp_path):
+    """It used to arrive white, as no node is nearest to it."""
+    black = extension.api.new_material("lambert", rho=0)
+    black.name = "black"
+    helpers.add_sphere(empty, black, segments=8)
+    _export_and_import(tmp_path / "ball.glb")
+    found = _principled(bpy.data.materials["black"])
+    assert tuple(found["Base Color"].default_value) == (0, 0, 0, 1)
+    assert found["IOR"].default_value == 1 and found["Metallic"].default_value == 0
+
+
 def test_nearest_principled(extension, empty):
     """Of a linked parameter the default counts, and a black material has none."""
     material = extension.api.new_material("lambert", rho=(0.5, 0.2, 0.1))

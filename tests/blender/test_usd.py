@@ -134,6 +134,16 @@ def test_other_materials_are_exported_as_ever(extension, empty, exporter, tmp_pa
     assert _surface(text, "mixed") is None
 
 
+def test_a_black_material_arrives_black(extension, empty, exporter, tmp_path):
+    black = extension.api.new_material("lambert", rho=0)
+    black.name = "black"
+    helpers.add_sphere(empty, black, segments=8)
+    found = _surface(_export(tmp_path / "ball.usda"), "black")
+    assert not found["diffuseColor"].any() and found["metallic"] == 0
+    _import(tmp_path / "ball.usda")
+    assert _light(bpy.context.scene)[0][2:4, 2:4].max() < 1e-3
+
+
 def test_of_two_nodes_the_file_has_the_one_that_is_shown(extension, convert, exporter, tmp_path):
     """The exporter takes any Principled node, linked or not. The one that conversion leaves in a
     material has its textures."""
