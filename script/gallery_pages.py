@@ -122,7 +122,7 @@ def main():
     command = sys.argv[3]
     report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     pages.mkdir(parents=True, exist_ok=True)
-    index = ["# Gallery", ""]
+    index = ["# Papers' scenes, compared", ""]
     index += [
         "Scenes of the papers, and a few of ours. Left: Blender, with the form that *auto*",
         "selects. Middle: the reference renderer, which evaluates the models themselves. Right:",

@@ -9,8 +9,9 @@ file. Repetitions of several jobs take turns, so that their run times can be com
     python script/render_scene.py --extension ZIP --jobs jobs.json
 
 jobs.json: [{"scene": ..., "out": ..., "representation": ..., "spp": ..., "seed": ...,
-"repeat": ..., "native": ..., "pack": ..., "timed": ..., "denoise": ..., "view": ..., "osl": ...},
-...]; all but scene and out are optional, and default to the options of the command line.
+"repeat": ..., "native": ..., "pack": ..., "timed": ..., "denoise": ..., "view": ..., "osl": ...,
+"width": ...}, ...]; all but scene and out are optional, and default to the options of the command
+line.
 
 "native" names a file with a scene's materials from script/native_nodes.py. "pack" is a folder that
 `brdfc build` wrote, whose models are used instead of the extension's own. "timed" false omits the
@@ -144,6 +145,10 @@ def render_once(bpy, loader, job, repetition, threads=None):
     samples = job["spp"] or scene.cycles.samples
     if job["seed"] is not None:
         scene.cycles.seed = job["seed"]
+    if job["width"] is not None:
+        render, width = scene.render, job["width"]
+        height = round(render.resolution_y * width / render.resolution_x)
+        render.resolution_x, render.resolution_y = width, max(height, 1)
     if threads:
         scene.render.threads_mode, scene.render.threads = "FIXED", threads
     one_cpu, one_wall = timed_render(bpy, 1) if job["timed"] else (None, None)
@@ -220,6 +225,7 @@ def read_jobs(options):
         "representation": options.representation,
         "spp": options.spp,
         "seed": options.seed,
+        "width": options.width,
         "repeat": options.repeat,
         "native": None,
         "pack": None,
@@ -247,7 +253,7 @@ def read_jobs(options):
         if unknown := sorted(set(job) - set(defaults) - {"scene", "out", "name"}):
             raise UsageError(f"{options.jobs}: job {index}: unknown key {unknown[0]}")
         merged = defaults | job
-        for key, least in (("spp", 1), ("seed", 0), ("repeat", 1)):
+        for key, least in (("spp", 1), ("seed", 0), ("width", 1), ("repeat", 1)):
             value = merged[key]
             if value is not None and (not isinstance(value, int) or value < least):
                 raise UsageError(
@@ -331,6 +337,7 @@ def main():
         "twin; glossy, principled or metallic for Blender's own nodes",
     )
     parser.add_argument("--spp", type=int, help="samples a pixel; default: as the scene says")
+    parser.add_argument("--width", type=int, help="pixels across; default: as the scene says")
     parser.add_argument("--seed", type=int, help="random numbers; default: as the scene says")
     parser.add_argument("--threads", type=int, help="threads of Cycles; default: all")
     parser.add_argument("--repeat", type=int, default=1, help="renders a job; times are medians")

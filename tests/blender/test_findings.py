@@ -522,7 +522,7 @@ def test_black_aovs_are_a_finding(extension, empty, write):
     assert found(extension, material, empty) == {}
     write(material)
     messages = found(extension, material, empty)
-    assert list(messages) == ["black_aovs"] and "black then (ID)" in messages["black_aovs"]
+    assert list(messages) == ["black_aovs"] and "black (ID)" in messages["black_aovs"]
     assert [f.severity for f in api.warnings(material, empty)] == ["WARNING"]
     assert [f.code for f in api.scene_warnings(empty)] == ["black_aovs"]
     empty.cycles.shading_system = False
@@ -539,7 +539,7 @@ def test_turning_osl_on_says_that_aovs_will_be_black(extension, empty, capfd):
     empty.cycles.shading_system = False
     capfd.readouterr()
     assert bpy.ops.brdfc.enable_osl() == {"FINISHED"}
-    assert "Cycles leaves AOVs black then (ID)" in "".join(capfd.readouterr())
+    assert "Cycles leaves AOVs black (ID)" in "".join(capfd.readouterr())
 
 
 # ---- the console ---------------------------------------------------------------------------------

@@ -95,7 +95,7 @@ def test_what_was_made_once_is_appended(extension, kept, monkeypatch):
 def test_what_materials_add_to_a_file(extension, empty, tmp_path):
     """In bytes, compressed, as docs/nodes.md says: the first material brings the groups that all
     models share, others of its model next to nothing. In a Blender that has run long, addresses
-    compress worse: 542, 253 and 792 KB, and 456, 235 and 716 KB in a new one."""
+    compress worse: 598, 255 and 792 KB. Of a first material, 56 KB are for spots."""
     file = str(tmp_path / "grown.blend")
     sizes = []
     for model in (None, "phong", "phong", "ward", "factors"):
@@ -105,7 +105,7 @@ def test_what_materials_add_to_a_file(extension, empty, tmp_path):
         sizes.append(Path(file).stat().st_size)
     first, again, ward, factors = np.diff(sizes)
     print("KB:", *(np.diff(sizes) // 1000))
-    assert again < 5e3 and ward < 270e3 and first < 570e3 and factors < 830e3
+    assert again < 5e3 and ward < 270e3 and first < 620e3 and factors < 830e3
 
 
 def test_parts_that_an_append_brings_again_are_merged(extension, empty, tmp_path):

@@ -2,6 +2,7 @@
 """Which pictures the gallery shows, and its pages."""
 
 import json
+import re
 
 import demo_matrix
 import gallery_check
@@ -10,6 +11,7 @@ import gallery_pages
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from support import ROOT
 
 MODELS = {"plain": {"auto": "exact", "representations": {"exact": {}, "sampled": {}}}}
 SCENE = {
@@ -171,3 +173,13 @@ def test_every_scene_is_among_some_third():
     thirds = {tuple(gallery_check.third(scenes, f"commit {i}")) for i in range(50)}
     assert len(thirds) == 3
     assert sorted(scene for third in thirds for scene in third) == sorted(scenes)
+
+
+def test_large_pictures_are_of_scenes_and_large():
+    page = (ROOT / "docs" / "gallery" / "pictures.md").read_text(encoding="utf-8")
+    shown = re.findall(r"\]\((\S+)-large\.jpg\)", page)
+    made = {p.name.removesuffix("-large.jpg") for p in (ROOT / "docs/gallery").glob("*-large.jpg")}
+    assert len(shown) > 3 and set(shown) == made, "run script/gallery large"
+    for name in shown:
+        assert (ROOT / "scenes" / f"{name}.json").is_file()
+        assert oiio.ImageBuf(str(ROOT / f"docs/gallery/{name}-large.jpg")).spec().width >= 800
