@@ -165,6 +165,18 @@ template <class T> Against<T> against(const LampPatch<T>& patch, const Vec3<T>& 
 /// falls to 0 there.
 inline constexpr double kLeastProfile = 0.25;
 
+/// AimedLamp::emphasis of the chosen point. `solid_angle`: what the point stands for. `mean_rise`: the mean of solid
+/// angle times cosine to the lobe's normal.
+///
+/// Divides by the lobe: by its profile at the point, which is even about the lamp's centre, but by the mean cosine over
+/// the whole lamp. If the cosine at the point were used as well, f and the cosine of the point where light sampling
+/// hits the lamp would be correlated wrongly, and the average would not be f.
+template <class T> T emphasis_of(const AimedLamp<T>& lamp, const T& solid_angle, const T& mean_rise) {
+  const T rise = dot(lamp.lobe.half, lamp.lobe.towards);
+  const T profile = maximum(profile_of(lamp.lobe, dot(lamp.lobe.towards, lamp.wi)), T(kLeastProfile));
+  return solid_angle * rise / maximum(profile * mean_rise, tiny<T>());
+}
+
 /// Aims a closure at a lamp. `shining`: the mean of its lit_part(), or the lamp itself. `room`: see room_beside(). v1,
 /// v2: numbers in [0, 1) that choose a point of `shining`.
 template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const LampPatch<T>& shining, const T& room,
@@ -211,11 +223,7 @@ template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const LampPatc
   const T least_rise = rise * sqrt(T(1) - sqr(sinRadius)) - sqrt(maximum(T(1) - sqr(rise), T(0))) * sinRadius;
   const auto usable = radius2 < T(kNearest * kNearest) * distance2 && dot(shining.across, shining.across) > T(0) &&
                       least_rise > maximum(T(kLeastRise), T(kLeastShare) * rise);
-  // Divide by the lobe: by its profile at the point, which is even about the lamp's centre, but by the mean cosine over
-  // the whole lamp. If the cosine at the point were used as well, f and the cosine of the point where light sampling
-  // hits the lamp would be correlated wrongly, and the average would not be f.
-  const T profile = maximum(profile_of(lamp.lobe, dot(towards, lamp.wi)), T(kLeastProfile));
-  lamp.emphasis = select(usable, density(point) * rise / maximum(profile * mean_rise, tiny<T>()), T(0));
+  lamp.emphasis = select(usable, emphasis_of(lamp, density(point), mean_rise), T(0));
   return lamp;
 }
 
@@ -252,11 +260,9 @@ AimedLamp<T> cut_off(AimedLamp<T> lamp, const LampPatch<T>& shining, const Vec3<
               });
   const T mean_rise = turns[2] / T(2 * kSteps);
   lamp.wi = normalize(Vec3<T>{turns[3], turns[4], turns[5]});
-  const T rise = dot(lamp.lobe.half, lamp.lobe.towards);
-  const T profile = maximum(profile_of(lamp.lobe, dot(lamp.lobe.towards, lamp.wi)), T(kLeastProfile));
   // If the lobe's normal lies below the plane, the lobe is black everywhere above it.
   const auto shows = lamp.emphasis > T(0) && mean_rise > T(0) && dot(lamp.lobe.half, normal) > T(0);
-  lamp.emphasis = select(shows, turns[6] * rise / maximum(profile * mean_rise, tiny<T>()), T(0));
+  lamp.emphasis = select(shows, emphasis_of(lamp, turns[6], mean_rise), T(0));
   return lamp;
 }
 

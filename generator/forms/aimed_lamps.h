@@ -7,6 +7,7 @@
 #pragma once
 
 #include "core/vec.h"
+#include "forms/spot_falloff.h"
 
 namespace brdfc::forms {
 
@@ -85,13 +86,13 @@ template <class T> struct LampBeam {
   T edge;        ///< cosine of the cone's half angle, above 0
   T blend;       ///< spot: fraction of 1 - edge over which it fades; negative: an area lamp with spread
 
-  /// Relative radiance that arrives at the shading point from direction wi. As in Cycles (kernel/light/spot.h and
-  /// area.h), a spot fades with smoothstep of the cosine, a spread lamp with the tangent.
+  /// Relative radiance that arrives at the shading point from direction wi. A spot fades with
+  /// spot_falloff(), a spread lamp with the tangent, as in Cycles (kernel/light/area.h).
   T operator()(const Vec3<T>& wi) const {
     const T c = maximum(dot(axis, wi), tiny<T>());
-    const T into = clamp01((c - edge) / maximum(blend * (T(1) - edge), T(1e-4)));
+    const T of_spot = spot_falloff(c - edge, maximum(blend * (T(1) - edge), T(1e-4)));
     const auto tangent = [](const T& cosine) { return sqrt(maximum(T(1) - sqr(cosine), T(0))) / cosine; };
-    return select(blend < T(0), maximum(tangent(edge) - tangent(c), T(0)), sqr(into) * (T(3) - T(2) * into));
+    return select(blend < T(0), maximum(tangent(edge) - tangent(c), T(0)), of_spot);
   }
 };
 

@@ -525,7 +525,7 @@ def spot_of_new_files(scene):
 def test_a_lamp_that_shines_within_a_cone(extension, model, values, form, light):
     """Averaged over the whole lamp, these highlights would be 40 % too dark to 33 % too bright
     under area lamps, and 5 % too dark under spots. The mean light over a cone is known to 2 % for
-    area lamps and to 0.7 % for spots (generator/forms/node_cones.h)."""
+    area lamps and to 0.7 % for spots (generator/forms/node_light.h)."""
     a, b = (blocks_of(extension, model, values, f, light, 256) for f in ("nodes", form))
     off, error, _ = difference(a, b)
     found, wanted = a.mean(0), b.mean(0)
