@@ -65,16 +65,7 @@ def test_materials_arrive_as_the_nearest_principled_nodes(
 
 
 def test_other_materials_are_exported_as_ever(extension, empty, exporter, tmp_path):
-    """A Principled node, also under a coat, and a mix of two models, which no single node stands
-    for."""
-    for name in ("plain", "coated"):
-        principled = helpers.node_material("ShaderNodeBsdfPrincipled", Roughness=0.25, Metallic=1.0)
-        principled.name = name
-        helpers.add_sphere(empty, principled, segments=8)
-    extension.api.add_coat(bpy.data.materials["coated"])
-    mixed = extension.api.new_sum([("ward", {}), ("lambert", {})])
-    mixed.name = "mixed"
-    helpers.add_sphere(empty, mixed, segments=8)
+    helpers.add_balls_of_no_single_model(empty, extension.api)
     _export_and_import(tmp_path / "balls.glb")
     for name in ("plain", "coated"):
         assert _principled(bpy.data.materials[name])["Roughness"].default_value == 0.25

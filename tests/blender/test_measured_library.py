@@ -83,6 +83,18 @@ def load(blend):
     return {material.name: material for material in here.materials}
 
 
+def replace_second_blender(module, monkeypatch, blend, listed=None):
+    """By a program that copies `blend` as what it made, and the list that it was given to
+    `listed`."""
+    script = (
+        "import pathlib, shutil, sys; blend, listed, folder, *given = sys.argv[1:];"
+        "folder = pathlib.Path(folder); shutil.copy(blend, folder / 'materials.blend');"
+        "listed and shutil.copy(given[0], listed); (folder / 'refusals.json').write_text('{}')"
+    )
+    command = [sys.executable, "-c", script, str(blend), str(listed or "")]
+    monkeypatch.setattr(module, "build_command", lambda *arguments: [*command, *arguments])
+
+
 @pytest.mark.long
 def test_a_folder_becomes_a_catalogue(
     extension, module, empty, folder, tmp_path, tmp_path_factory, monkeypatch
@@ -136,13 +148,7 @@ def test_a_folder_becomes_a_catalogue(
     kept.write_bytes(bytes_before)
     blend.unlink()
     bpy.data.libraries.write(str(blend), set(), compress=False)
-    script = (
-        "import pathlib, shutil, sys; folder = pathlib.Path(sys.argv[2]);"
-        "shutil.copy(sys.argv[1], folder / 'materials.blend');"
-        "(folder / 'refusals.json').write_text('{}')"
-    )
-    command = [sys.executable, "-c", script, str(kept)]
-    monkeypatch.setattr(module, "build_command", lambda *arguments: [*command, *arguments])
+    replace_second_blender(module, monkeypatch, kept)
     again = extension.api.new_measured_library(folder, blend, "lambert")
     assert again.materials == made.materials and cats.read_text() == text
     assert blend.read_bytes() == bytes_before
@@ -154,13 +160,8 @@ def test_what_keeps_a_model_from_coming_closer(extension, module, tmp_path, monk
     data.mkdir()
     write_wide(data / "wide.csv", import_module(f"{extension.package}.brdfc"))
     blend, listed = tmp_path / "measured.blend", tmp_path / "listed.json"
-    script = (
-        "import pathlib, shutil, sys; folder = pathlib.Path(sys.argv[2]);"
-        "shutil.copy(sys.argv[3], sys.argv[1]); (folder / 'materials.blend').write_bytes(b'x');"
-        "(folder / 'refusals.json').write_text('{}')"
-    )
-    command = [sys.executable, "-c", script, str(listed)]
-    monkeypatch.setattr(module, "build_command", lambda *arguments: [*command, *arguments])
+    (tmp_path / "any.blend").write_bytes(b"x")
+    replace_second_blender(module, monkeypatch, tmp_path / "any.blend", listed)
     made = extension.api.new_measured_library(data, blend, "cook_torrance")
     (said,) = made.remarks[data / "wide.csv"]
     assert said.startswith("The fit stopped at the end of the range of Slope")

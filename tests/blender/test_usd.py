@@ -117,16 +117,7 @@ def test_imported_materials_reflect_nearly_the_same_light(extension, empty, expo
 
 
 def test_other_materials_are_exported_as_ever(extension, empty, exporter, tmp_path):
-    """A Principled node, also under a coat, and a mix of two models, which no single node stands
-    for."""
-    for name in ("plain", "coated"):
-        principled = helpers.node_material("ShaderNodeBsdfPrincipled", Roughness=0.25, Metallic=1.0)
-        principled.name = name
-        helpers.add_sphere(empty, principled, segments=8)
-    extension.api.add_coat(bpy.data.materials["coated"])
-    mixed = extension.api.new_sum([("ward", {}), ("lambert", {})])
-    mixed.name = "mixed"
-    helpers.add_sphere(empty, mixed, segments=8)
+    helpers.add_balls_of_no_single_model(empty, extension.api)
     text = _export(tmp_path / "balls.usda")
     for name in ("plain", "coated"):
         assert _surface(text, name)["roughness"] == 0.25
