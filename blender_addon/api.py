@@ -74,6 +74,8 @@ __all__ = [
     "plan_conversion",
     "prepare_material",
     "remove_library",
+    "replace_by_principled",
+    "restore_models",
     "scene_warnings",
     "see_lamps",
     "set_kernel",
@@ -517,6 +519,25 @@ def nearest_principled(material, node=None):
         "transmission": float(near.transmission),
         "error": near.error,
     }
+
+
+def replace_by_principled(material):
+    """Puts the nearest Principled node in the place of a material's models, for export to files
+    that can't hold these. The models stay in the material, unlinked, for restore_models().
+
+    Links of normals and tangents, and of a colour that the base colour follows, are kept. Returns
+    an object with the fraction of the light from 45 degrees that the node misplaces, `error`, and
+    the labels of the parameters whose links are not kept, `lost`; line() says both. Raises
+    ValueError for a material that shows no model, for a converted one, which convert_back()
+    restores, and where other shaders than constant mixes, coats and Diffuse nodes stand beside the
+    models; in all cases nothing is changed."""
+    return convert.replace_by_principled(argument_checks.material(material))
+
+
+def restore_models(material):
+    """Undoes replace_by_principled(). Returns whether there was something to undo. Raises
+    ValueError if the models' node was deleted or has another name."""
+    return convert.restore_models(argument_checks.material(material))
 
 
 def add_albedo(material, node=None):

@@ -11,7 +11,7 @@ class glTF2ExportUserExtension:  # the exporter looks for this name
     """The exporter makes one for each file, and logs what its methods raise."""
 
     def gather_material_hook(self, gltf2_material, blender_material, export_settings):
-        """Fills in a material that is a model's node alone."""
+        """Fills in a material of models alone."""
         near = nearest_node.of_material(blender_material)
         if near is not None:
             _fill(gltf2_material, near)

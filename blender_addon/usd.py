@@ -10,7 +10,7 @@ from pathlib import Path
 
 import bpy
 
-from .convert import is_converted
+from .convert import is_of_conversion
 from .groups import model_nodes
 from .plotting import nearest_node
 
@@ -25,7 +25,7 @@ class BRDFC_UH_nearest(getattr(bpy.types, "USDHook", object)):
 
     @staticmethod
     def on_material_export(export_context, bl_material, usd_material):
-        """Fills in a material that is a model's node alone."""
+        """Fills in a material of models alone."""
         near = nearest_node.of_material(bl_material)
         if near is None or _has_textures(bl_material, usd_material):
             return False
@@ -34,11 +34,12 @@ class BRDFC_UH_nearest(getattr(bpy.types, "USDHook", object)):
 
 
 def _has_textures(material, usd_material):
-    """Whether the exporter wrote the node that a model with linked sockets replaced: conversion
+    """Whether the exporter wrote the node that models with linked sockets replaced: conversion
     leaves it in the material, with its textures, which the nearest node lacks."""
-    (node,) = model_nodes.shown_nodes(material)
-    linked = any(socket.is_linked for socket in model_nodes.sockets(node).values())
-    return linked and is_converted(node) and bool(usd_material.GetSurfaceOutput())
+    nodes = model_nodes.shown_nodes(material)
+    linked = any(s.is_linked for node in nodes for s in model_nodes.sockets(node).values())
+    left = all(map(is_of_conversion, nodes)) and bool(usd_material.GetSurfaceOutput())
+    return linked and left
 
 
 def _fill(usd_material, near):

@@ -49,6 +49,11 @@ def is_converted(node):
     return model_nodes.is_ours(node) and BEFORE in node
 
 
+def is_of_conversion(node):
+    """Whether a model's node replaces one of Blender's own, alone or beside others."""
+    return is_converted(node) or HELPS in node
+
+
 def _before(group):
     before = group.id_data.nodes.get(group[BEFORE])
     return before if before is not None and before.bl_idname in KINDS else None

@@ -9,8 +9,9 @@ from ..content.wiring import Wiring
 from ..trees import shader_trees
 from . import nodes
 
-#: Marks the node group that puts a layer over a shader.
+#: Marks the node group that puts a layer over a shader, and the names of its inputs for these.
 _TAG = "brdfc_layer"
+LAYER, BELOW = "Layer", "Below"
 
 
 def add_shaders(tree, node, others):
@@ -71,10 +72,15 @@ def _put_over(layer, below):
     both.node_tree, both.label = _layer_over(), "Layer Over"
     layer.location = (x, y + 300)
     both.location = (x + max(layer.width, below.node.width) + 60, y + 100)
-    tree.links.new(layer.outputs["BSDF"], both.inputs["Layer"])
+    tree.links.new(layer.outputs["BSDF"], both.inputs[LAYER])
     tree.links.new(layer.outputs[ALBEDO], both.inputs[ALBEDO])
-    tree.links.new(below, both.inputs["Below"])
+    tree.links.new(below, both.inputs[BELOW])
     return both.outputs[0]
+
+
+def puts_layer(node):
+    """Whether a group node is one that puts a layer over a shader."""
+    return bool(getattr(node, "node_tree", None)) and bool(node.node_tree.get(_TAG))
 
 
 def _lead_to(output, target):
@@ -106,14 +112,14 @@ def _layer_over():
             return group
     group = bpy.data.node_groups.new("Layer Over", "ShaderNodeTree")
     group[_TAG] = True
-    for name, kind in (("Layer", "Shader"), (ALBEDO, "Color"), ("Below", "Shader")):
+    for name, kind in ((LAYER, "Shader"), (ALBEDO, "Color"), (BELOW, "Shader")):
         group.interface.new_socket(name, in_out="INPUT", socket_type=f"NodeSocket{kind}")
     group.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
     w = Wiring(group)
     start, end = w.node("NodeGroupInput"), w.node("NodeGroupOutput")
     red, green, blue = w.separate(start.outputs[ALBEDO])
     largest = w.math("MAXIMUM", w.math("MAXIMUM", red, green), blue)
-    left = w.shown(w.math("SUBTRACT", 1.0, largest), start.outputs["Below"])
-    w.give(end.inputs[0], w.sum([start.outputs["Layer"], left]))
+    left = w.shown(w.math("SUBTRACT", 1.0, largest), start.outputs[BELOW])
+    w.give(end.inputs[0], w.sum([start.outputs[LAYER], left]))
     w.place_nodes()
     return group

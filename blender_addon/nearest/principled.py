@@ -198,6 +198,12 @@ class Search:
         error = misplaced(found, curve, self.area)
         return Nearest(r, m, float(_IOR[index]), color, found, error)
 
+    def color(self, curve, near):
+        """The base colour with which a Nearest node, whose other inputs stay, fits a curve best."""
+        parts = self._parts(np.array([near.roughness]))
+        which = np.array([int(np.argmin(np.abs(_IOR - near.ior)))])
+        return self._best(parts, curve, np.array([near.metallic]), which)[-1]
+
 
 @functools.cache
 def _search(incidence, angles):
@@ -267,6 +273,15 @@ def _smooth_node(curve, search, cosines, shares, here):
         off += scattered.sum()
     arrows = tuple(mirror.tolist()), tuple(refracted.tolist())
     return Nearest(0.0, metallic, ior, native.color, found, float(off), through, *arrows)
+
+
+def color_like(near, curve, angles, incidence, cosines, shares):
+    """The base colour (3,) with which a Nearest node, whose other inputs stay, comes nearest to a
+    material; arguments as those of nearest()."""
+    if near.roughness > 0:
+        return _search(incidence, angles.tobytes()).color(curve, near)
+    given = np.array([near.metallic]), np.array([near.ior])
+    return _smooth_best(shares, cosines, *given, near.transmission)[-1]
 
 
 def nearest(curve, angles, incidence, cosines, shares, here):

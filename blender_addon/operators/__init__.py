@@ -4,7 +4,12 @@
 import bpy
 
 from .adding import BRDFC_OT_add_node, BRDFC_OT_new_material, BRDFC_OT_search
-from .convert import BRDFC_OT_convert, BRDFC_OT_convert_back
+from .convert import (
+    BRDFC_OT_convert,
+    BRDFC_OT_convert_back,
+    BRDFC_OT_to_models,
+    BRDFC_OT_to_principled,
+)
 from .lean import BRDFC_OT_bake, BRDFC_OT_bake_apply, BRDFC_OT_bake_plan, BRDFC_OT_write_materials
 from .measured import (
     BRDFC_FH_measured,
@@ -41,6 +46,8 @@ _CLASSES = (
     BRDFC_OT_add_coat,
     BRDFC_OT_convert,
     BRDFC_OT_convert_back,
+    BRDFC_OT_to_models,
+    BRDFC_OT_to_principled,
     BRDFC_OT_details,
     BRDFC_OT_more,
     BRDFC_OT_update,

@@ -7,7 +7,7 @@ from bpy.props import FloatProperty
 from bpy.types import Operator
 
 from .. import api, convert
-from ..common.i18n import rpt, say
+from ..common.i18n import of_error, rpt, say
 from ..groups import model_nodes
 from ..panels.labels import wrapped
 from .common import ERRORS, ChangesActiveMaterial, refused, report_osl
@@ -87,6 +87,44 @@ class BRDFC_OT_convert(Operator):
         done = [node for m in _selected_materials(context) for node in model_nodes.group_nodes(m)]
         report_osl(self, done, context.scene)
         return {"FINISHED"} if count else {"CANCELLED"}
+
+
+class BRDFC_OT_to_principled(Operator):
+    bl_idname = "brdfc.to_principled"
+    bl_label = "Replace by Principled Nodes"
+    bl_description = (
+        "For export: in the selected objects' materials, put the nearest Principled node in the "
+        "place of the models, which can be put back"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return any(map(model_nodes.shown_nodes, _selected_materials(context)))
+
+    def execute(self, context):
+        done = 0
+        for material in filter(model_nodes.shown_nodes, _selected_materials(context)):
+            try:
+                self.report({"INFO"}, rpt(api.replace_by_principled(material).line()))
+                done += 1
+            except ERRORS as error:
+                self.report({"WARNING"}, rpt(of_error(error)[0]))
+        return {"FINISHED"} if done else {"CANCELLED"}
+
+
+class BRDFC_OT_to_models(ChangesActiveMaterial, Operator):
+    bl_idname = "brdfc.to_models"
+    bl_label = "Back to the Models"
+    bl_description = "Put the active material's models back in the place of its Principled node"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        try:
+            done = api.restore_models(context.object.active_material)
+        except ERRORS as error:
+            return refused(self, error)
+        return {"FINISHED"} if done else {"CANCELLED"}
 
 
 class BRDFC_OT_convert_back(ChangesActiveMaterial, Operator):

@@ -72,6 +72,7 @@ def draw_material_menu(self, context):
     self.layout.operator("brdfc.new_measured_material", icon="FILE_FOLDER")
     self.layout.operator("brdfc.new_measured_library", icon="ASSET_MANAGER")
     self.layout.operator("brdfc.convert", icon="FILE_REFRESH")
+    self.layout.operator("brdfc.to_principled", icon="EXPORT")
     self.layout.operator("brdfc.add_coat", icon="NODE_MATERIAL")
 
 
@@ -324,6 +325,8 @@ def draw_material(layout, material, scene):
     draw_findings(layout, [f for f in found if f not in first])
     if any(convert.is_converted(node) for node in ours):
         layout.operator("brdfc.convert_back", icon="LOOP_BACK")
+    if convert.has_replaced(material):
+        layout.operator("brdfc.to_models", icon="LOOP_BACK")
     layout.operator("brdfc.write_materials", icon="EXPORT")
     layout.operator("brdfc.bake", icon="MOD_DECIM")
 

@@ -18,17 +18,15 @@ from .. import brdfc
 from ..brdfc._model import sequence
 from ..common import color
 from ..nearest import native_bsdf
-from ..nearest.principled import Nearest, Shares, misplaced, nearest
+from ..nearest.principled import Nearest, Shares, misplaced
+from . import reflected
 
 #: Sizes in pixels: width of the picture, diameter of a ball, height of the legend's lines below it.
 SIZE, BALL, KEY = 324, 108, 10
 #: Rows of a picture, from the lowest up.
 CURVES, BALLS, ABOVE = slice(0, 104), slice(104, 222), slice(222, 384)
-#: The angle of the incident light in the polar plot, in degrees.
-INCIDENCE = 45.0
-#: Numbers of samples of a model's albedo and of a form's three sampling techniques, and of view
-#: angles.
-_SAMPLES, _FORM_SAMPLES, _VIEWS = 256, (128, 128, 256), 13
+#: Numbers of samples of a form's three sampling techniques.
+_FORM_SAMPLES = 128, 128, 256
 _HALF = SIZE // 2
 _PAPER, _GRID, _INK = 0.13, 0.28, 0.55
 #: Colour of a form's dotted curve: no sum of red, green and blue curves has it.
@@ -53,63 +51,29 @@ class Legend:
     refracted: tuple | None = None
 
 
-def values_in_range(model, values):
-    """Clamps a node's values to their ranges: sockets are floats, so the last digit may be outside.
-    Drops values that are None (linked) and those that belong to no parameter."""
-    known = {}
-    for name, parameter in model.parameters.items():
-        value = values.get(name)
-        if value is None:
-            continue
-        if isinstance(parameter, brdfc.Choice):
-            known[name] = value
-        else:
-            known[name] = np.clip(np.asarray(value, float), parameter.min, parameter.max)
-    return known
-
-
-def _slice(theta):
-    return np.stack([np.sin(theta), np.zeros_like(theta), np.cos(theta)], axis=-1)
-
-
-def slice_of(model, values, theta):
-    """f cos for light from INCIDENCE, towards these angles (positive on the side of the mirror
-    direction): (N, 3)."""
-    light = _slice(np.radians(-INCIDENCE))
-    return model.eval(_slice(theta), light, **values) * np.cos(theta)[:, None]
-
-
 def glossy_slice(alpha, theta):
     """The same for Blender's white Glossy node with the GGX distribution of this alpha, which is
     the roughness squared; without multiple scattering: (N,)."""
-    light = _slice(np.radians(-INCIDENCE))
-    return native_bsdf.facets(_slice(theta), light, (alpha, alpha))
+    light = reflected.in_plane(np.radians(-reflected.INCIDENCE))
+    return native_bsdf.facets(reflected.in_plane(theta), light, (alpha, alpha))
 
 
 @functools.cache
 def _glossy_slices():
     """Roughness values of the Glossy node, and the slice of each."""
     roughness = np.linspace(0.05, 1, 39)
-    return roughness, np.stack([glossy_slice(r * r, _angles()) for r in roughness])
+    return roughness, np.stack([glossy_slice(r * r, reflected.angles()) for r in roughness])
 
 
 def nearest_glossy(curve):
     """The roughness of the Glossy node whose slice comes nearest in shape to a curve over
-    _angles(), and that slice, scaled to fit; nothing for a curve that is 0."""
+    angles(), and that slice, scaled to fit; nothing for a curve that is 0."""
     if not curve.any():
         return None
     roughness, slices = _glossy_slices()
     heights = slices @ curve / np.sum(slices * slices, axis=1)
     best = int(np.argmin(np.sum((heights[:, None] * slices - curve) ** 2, axis=1)))
     return float(roughness[best]), heights[best] * slices[best]
-
-
-@functools.cache
-def _angles():
-    """Angles of the half circle, densest around the mirror direction, where lobes are narrow."""
-    even = np.linspace(-np.pi / 2, np.pi / 2, 361)
-    near = np.radians(INCIDENCE) + np.geomspace(1e-4, 0.2, 60)[:, None] * np.array([-1, 1])
-    return np.unique(np.concatenate([even, near.ravel(), [np.radians(INCIDENCE)]]))
 
 
 @functools.cache
@@ -123,31 +87,33 @@ def _polar_grid(whole=False):
 
 @functools.cache
 def _pixels_among_angles(whole):
-    """Positions of the pixels' angles among _angles(): the index below, and the fraction beyond
+    """Positions of the pixels' angles among angles(): the index below, and the fraction beyond
     it."""
-    angles, (_, angle, _) = _angles(), _polar_grid(whole)
+    angles, (_, angle, _) = reflected.angles(), _polar_grid(whole)
     below = np.clip(np.searchsorted(angles, angle) - 1, 0, len(angles) - 2)
     share = (angle - angles[below]) / (angles[below + 1] - angles[below])
     return below, np.clip(share, 0, 1)
 
 
 def _in_pixels(curve, whole):
-    """Interpolates a curve over _angles() to the angles of the pixels."""
+    """Interpolates a curve over angles() to the angles of the pixels."""
     below, share = _pixels_among_angles(whole)
     return curve[below] + share * np.diff(curve)[below]
 
 
 def _line(curve, dash=None, whole=False):
-    """The coverage of each pixel, 0 to 1, by a curve over _angles() drawn two pixels wide. `dash`:
+    """The coverage of each pixel, 0 to 1, by a curve over angles() drawn two pixels wide. `dash`:
     period in pixels, and the fraction of it that is drawn."""
     radius, angle, unit = _polar_grid(whole)
-    at, slope = _in_pixels(curve, whole), _in_pixels(np.gradient(curve, _angles()), whole)
+    at, slope = _in_pixels(curve, whole), _in_pixels(np.gradient(curve, reflected.angles()), whole)
     off = np.abs(radius - at) / np.sqrt(1 + (slope / np.maximum(radius, 0.02)) ** 2)
     # Without this limit, the steep flanks of a narrow lobe would extend the line beyond its tip.
     tip = curve.max() + 1.4 / unit
     ink = np.clip(1.8 - off * unit, 0, 1) * (radius < tip) * (np.abs(angle) <= np.pi / 2)
     if dash:  # by the length of the curve: on flanks, the radius
-        steps = np.hypot(np.diff(curve), 0.5 * (curve[1:] + curve[:-1]) * np.diff(_angles()))
+        steps = np.hypot(
+            np.diff(curve), 0.5 * (curve[1:] + curve[:-1]) * np.diff(reflected.angles())
+        )
         way = _in_pixels(np.concatenate([[0], np.cumsum(steps)]), whole)
         along = np.where(np.abs(slope) > radius, radius, way)
         ink *= along * unit % dash[0] < dash[0] * dash[1]
@@ -191,7 +157,7 @@ def _complete(model, values):
 
 def _refraction(ior):
     """The angle, from the upper normal, of the light refracted below the surface."""
-    return np.pi - np.arcsin(np.clip(np.sin(np.radians(INCIDENCE)) / ior, 0, 1))
+    return np.pi - np.arcsin(np.clip(np.sin(np.radians(reflected.INCIDENCE)) / ior, 0, 1))
 
 
 def _draw_lobes(picture, own, form, node, whole):
@@ -211,7 +177,7 @@ def _draw_lobes(picture, own, form, node, whole):
         np.maximum(picture[..., c], 0.35 * within, out=picture[..., c])
     others = (None if c is None else np.clip(0.95 / peak * c, 0, 1) for c in (form, node))
     _draw_curves(picture, functools.partial(_line, whole=whole), over_peak, *others)
-    off = None if form is None else misplaced(form, own, np.gradient(_angles()))
+    off = None if form is None else misplaced(form, own, np.gradient(reflected.angles()))
     return {"glossy": glossy[0] if glossy else None, "form": off}
 
 
@@ -225,18 +191,18 @@ def _polar(found, ior):
         picture[on if whole else on & (np.abs(angle) <= np.pi / 2)] = _GRID
     if whole:  # the surface
         picture[_HALF // 2, np.abs(np.arange(SIZE) + 0.5 - _HALF) < unit] = _INK
-    from_light = np.abs(angle + np.radians(INCIDENCE)) * radius * unit < 0.9
+    from_light = np.abs(angle + np.radians(reflected.INCIDENCE)) * radius * unit < 0.9
     picture[from_light & (radius < 1)] = _INK
     said = _draw_lobes(picture, *found.slices, whole)
     # Ideal reflection and refraction have no width, and are drawn as arrows.
     if here.mirror.any():
-        _draw_arrow(picture, np.radians(INCIDENCE), here.mirror, whole)
+        _draw_arrow(picture, np.radians(reflected.INCIDENCE), here.mirror, whole)
         said["mirror"] = tuple(here.mirror.tolist())
     if whole:
         _draw_arrow(picture, _refraction(ior), here.refracted, whole)
         said["refracted"] = tuple(here.refracted.tolist())
     if near and any(near.mirror):
-        _draw_arrow(picture, np.radians(INCIDENCE), near.mirror, whole, _ASIDE)
+        _draw_arrow(picture, np.radians(reflected.INCIDENCE), near.mirror, whole, _ASIDE)
     if whole and near and near.transmission:
         _draw_arrow(picture, _refraction(near.ior), near.refracted, whole, _ASIDE)
     return picture, Legend(principled=near, **said)
@@ -313,24 +279,6 @@ def _balls(lights):
     return picture
 
 
-def _degrees():
-    return np.linspace(0, 88, _VIEWS)
-
-
-@functools.cache
-def _views():
-    return np.cos(np.radians(_degrees()))
-
-
-def _directions():
-    return _slice(-np.arccos(_views()))
-
-
-def albedo_curve(model, values):
-    """The albedo at _VIEWS angles from 0 to 88 degrees: (_VIEWS, 3)."""
-    return model.albedo(_views(), samples=_SAMPLES, **values)
-
-
 @functools.cache
 def _numbers():
     """Random numbers for three sampling techniques: model, microfacets, cosine."""
@@ -339,17 +287,17 @@ def _numbers():
 
 def _form_excess(model, values, scattered, width):
     """How much more light a form scatters than the model, as a fraction of the incident light,
-    (_VIEWS, 3). `scattered`: the form's f cos for wi (_VIEWS, n, 3).
+    (VIEWS, 3). `scattered`: the form's f cos for wi (VIEWS, n, 3).
 
     Estimated by MIS of three techniques: the model's sampling, GGX microfacets of alpha `width`,
     and the cosine. The noise vanishes where the two scatter the same."""
-    wo, (u, of_h, of_z) = _directions()[:, None], _numbers()
+    wo, (u, of_h, of_z) = reflected.directions()[:, None], _numbers()
     drawn = model.sample(wo, u, **values)
     h = native_bsdf.draw_facets(of_h[:, 1:], (width, width))
     mirrored = 2 * (wo * h).sum(-1, keepdims=True) * h - wo
     r, phi = np.sqrt(of_z[:, 1]), 2 * np.pi * of_z[:, 2]
     matte = np.stack([r * np.cos(phi), r * np.sin(phi), np.sqrt(1 - r * r)], axis=-1)
-    matte = np.broadcast_to(matte, (_VIEWS, *matte.shape))
+    matte = np.broadcast_to(matte, (reflected.VIEWS, *matte.shape))
     wi = np.concatenate([drawn.wi, mirrored, matte], axis=1)
     lit = wi[..., 2] > 1e-6
     lit[:, : len(u)] &= drawn.pdf > 0
@@ -376,7 +324,7 @@ def _albedo(own, form, node):
     picture[margin : margin + along, margin] = _INK
 
     def line(curve, dash=None):
-        at = np.interp((columns - margin) * 90 / across, _degrees(), curve)
+        at = np.interp((columns - margin) * 90 / across, reflected.degrees(), curve)
         at = margin + np.clip(at, 0, top) / top * along
         slope = np.gradient(at)
         ink = np.clip(1.5 - np.abs(rows - at) / np.sqrt(1 + slope**2), 0, 1)
@@ -393,9 +341,9 @@ class Light:
     """The reflected light: of the model, of its form and of the nearest Principled node; None for
     what is not drawn."""
 
-    #: f cos over _angles(), (N, 3), for light from INCIDENCE.
+    #: f cos over angles(), (N, 3), for light from INCIDENCE.
     slices: tuple
-    #: Albedos at _VIEWS angles, (_VIEWS, 3), including ideal reflection and refraction.
+    #: Albedos at VIEWS angles, (VIEWS, 3), including ideal reflection and refraction.
     albedos: tuple
     #: Results of ball_light().
     balls: tuple
@@ -408,10 +356,12 @@ def _of_form(model, values, form, shares, width):
     """A form's scattered light in the plane of incidence, its albedo, and its ball. As all fitted
     forms are isotropic, one view for each ring of the ball spares most of the work."""
     index, lights, viewers = _rings()
-    wo = np.concatenate([_slice(np.radians([-INCIDENCE])), _directions(), viewers])
+    wo = np.concatenate(
+        [reflected.in_plane(np.radians([-reflected.INCIDENCE])), reflected.directions(), viewers]
+    )
     lobes = form(_complete(model, values), wo)
-    one, views, rings = slice(0, 1), slice(1, 1 + _VIEWS), slice(1 + _VIEWS, None)
-    curve = lobes.scattered(_slice(_angles())[None], one)[0]
+    one, views, rings = slice(0, 1), slice(1, 1 + reflected.VIEWS), slice(1 + reflected.VIEWS, None)
+    curve = lobes.scattered(reflected.in_plane(reflected.angles())[None], one)[0]
     excess = _form_excess(model, values, lambda wi: lobes.scattered(wi, views), width)
     ball = np.empty((2, len(_ball()[1]), 3))
     ball[0, index] = lobes.scattered(lights, rings)
@@ -421,12 +371,12 @@ def _of_form(model, values, form, shares, width):
 
 def _of_node(near):
     """The same for a Principled node."""
-    native, wo = near.native, _directions()
+    native, wo = near.native, reflected.directions()
     terms = native_bsdf.view_terms(native, wo)
     _, wi, viewers, _ = _ball()
     # np.interp needs increasing cosines, but they decrease from view to view.
     columns = terms.taken, *terms.gloss.T, *terms.metal.T
-    taken, *rest = (np.interp(viewers[:, 2], _views()[::-1], x[::-1]) for x in columns)
+    taken, *rest = (np.interp(viewers[:, 2], reflected.views()[::-1], x[::-1]) for x in columns)
     gloss, metal = np.stack(rest[:3], axis=-1), np.stack(rest[3:], axis=-1)
     of_view = native_bsdf.ViewTerms(taken, gloss, metal)
     f_cos = native_bsdf.f_cos_of_view(native, wi, viewers, of_view) * (not near.transmission)
@@ -434,36 +384,18 @@ def _of_node(near):
     return near.curve, native_bsdf.albedo(native, wo, terms), ball
 
 
-def _with_nearest(model, values):
-    """f cos of a model and its albedos, as in Light; its Shares for all views and for light from
-    INCIDENCE; and the nearest Principled node."""
-    wo, here = _directions(), _slice(np.radians(-INCIDENCE))
-    curve, albedo = slice_of(model, values, _angles()), albedo_curve(model, values)
-    mirror, refracted = model.mirror(wo, **values), model.transmit(wo, **values)
-    shares = Shares(mirror, np.maximum(albedo - mirror - refracted, 0), refracted)
-    scattered = np.array([np.interp(INCIDENCE, _degrees(), c) for c in shares.scattered.T])
-    here = Shares(model.mirror(here, **values), scattered, model.transmit(here, **values))
-    near = nearest(curve, _angles(), INCIDENCE, _views(), shares, here)
-    return curve, albedo, shares, here, near
-
-
-def nearest_to(model_name, values):
-    """The Principled node Nearest to a model with a node's values; None if it reflects nothing."""
-    model = brdfc.model(model_name)
-    return _with_nearest(model, values_in_range(model, values))[-1]
-
-
 def light(model, values, form=None):
     """The Light of a model at values_in_range(), and of `form` as in draw()."""
-    curve, albedo, shares, here, near = _with_nearest(model, values)
+    whole = reflected.of_model(model, values)
+    near = whole.nearest()
     _, wi, viewers, _ = _ball()
     f_cos, lit = np.zeros_like(wi), wi[:, 2] > 0
     f_cos[lit] = model.eval(wi[lit], viewers[lit], **values) * wi[lit, 2:]
-    own = curve, albedo, ball_light(f_cos, model.mirror(viewers, **values))
+    own = whole.curve, whole.albedo, ball_light(f_cos, model.mirror(viewers, **values))
     width = max(near.roughness**2, 0.01) if near else 1.0
-    formed = _of_form(model, values, form, shares, width) if form else (None,) * 3
+    formed = _of_form(model, values, form, whole.shares, width) if form else (None,) * 3
     node = _of_node(near) if near else (None,) * 3
-    return Light(*zip(own, formed, node, strict=True), here, near)
+    return Light(*zip(own, formed, node, strict=True), whole.here, near)
 
 
 def draw(model_name, values, form=None):
@@ -475,7 +407,7 @@ def draw(model_name, values, form=None):
     this extension lacks, and what `form` raises.
     """
     model = brdfc.model(model_name)
-    known = values_in_range(model, values)
+    known = reflected.values_in_range(model, values)
     found = light(model, known, form)
     above, legend = _polar(found, _complete(model, known).get("ior", 1.0))
     picture = np.ones((ABOVE.stop, SIZE, 4))

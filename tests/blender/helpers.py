@@ -270,18 +270,14 @@ def add_camera(scene, location=(0, -6, 0), rotation=(np.pi / 2, 0, 0), orthograp
     return data
 
 
-def add_balls_of_no_single_model(scene, api):
-    """Materials that exporters see without the extension's help: a Principled node, "plain", the
-    same under a coat, "coated", both with a roughness of 0.25, and a sum of models, "mixed", which
-    no single node stands for."""
+def add_balls_of_other_shaders(scene, api):
+    """Materials that exporters see without the extension's help: a Principled node, "plain", and
+    the same under a coat, "coated", both with a roughness of 0.25."""
     for name in ("plain", "coated"):
         principled = node_material("ShaderNodeBsdfPrincipled", Roughness=0.25, Metallic=1.0)
         principled.name = name
         add_sphere(scene, principled, segments=8)
     api.add_coat(bpy.data.materials["coated"])
-    mixed = api.new_sum([("ward", {}), ("lambert", {})])
-    mixed.name = "mixed"
-    add_sphere(scene, mixed, segments=8)
 
 
 def add_lamp(scene, kind="POINT", name="Lamp", location=(0, 0, 4), turn=(0, 0, 0), **settings):

@@ -65,11 +65,22 @@ def test_materials_arrive_as_the_nearest_principled_nodes(
 
 
 def test_other_materials_are_exported_as_ever(extension, empty, exporter, tmp_path):
-    helpers.add_balls_of_no_single_model(empty, extension.api)
+    helpers.add_balls_of_other_shaders(empty, extension.api)
     _export_and_import(tmp_path / "balls.glb")
     for name in ("plain", "coated"):
         assert _principled(bpy.data.materials[name])["Roughness"].default_value == 0.25
-    assert "mixed" in bpy.data.materials
+
+
+def test_a_sum_of_models_arrives_as_one_node(extension, empty, exporter, tmp_path):
+    """It used to arrive white."""
+    material = extension.api.new_sum(
+        [("lambert", {"rho": rho}) for rho in ((0.4, 0.1, 0.1), (0.1, 0.1, 0.4))]
+    )
+    material.name = "sum"
+    helpers.add_sphere(empty, material, segments=8)
+    _export_and_import(tmp_path / "ball.glb")
+    found = _principled(bpy.data.materials["sum"])["Base Color"].default_value
+    assert tuple(found)[:3] == pytest.approx((0.5, 0.2, 0.5), abs=0.01)
 
 
 def test_a_black_material_arrives_black(extension, empty, exporter, tmp_path):

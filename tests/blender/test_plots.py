@@ -151,7 +151,7 @@ def over_the_hemisphere(wo, count=120):
 def light_of(extension, plots, form_light, material):
     (node,) = extension.model_nodes.group_nodes(material)
     model = plots.brdfc.model(extension.model_nodes.identity(node).model)
-    values = plots.values_in_range(model, extension.api.get_parameters(material))
+    values = plots.reflected.values_in_range(model, extension.api.get_parameters(material))
     form = (
         functools.partial(form_light.lobes, node) if extension.model_nodes.is_fitted(node) else None
     )
@@ -178,7 +178,7 @@ def test_the_albedo_of_a_form_is_that_of_the_tools_closures(
     values = {name: extension.api.get_parameters(material)[name] for name in values}
     albedo = light_of(extension, plots, form_light, material).albedos[1]
     for view in (0, 4, 8, 10):
-        wo = plots._directions()[view]
+        wo = plots.reflected.directions()[view]
         wi, share = over_the_hemisphere(wo)
         every = np.broadcast_to(wo, wi.shape)
         expected = share @ of_tool(tool, form, model, values, over, wi, every)
@@ -214,7 +214,7 @@ def test_the_albedo_of_the_principled_node_adds_its_light_up(
     found = light_of(extension, plots, form_light, extension.api.new_material(model, **values))
     native = found.near.native
     for view in (0, 4, 8, 10):
-        wo = plots._directions()[view]
+        wo = plots.reflected.directions()[view]
         wi, share = over_the_hemisphere(wo)
         every = wo[None], np.zeros(len(wi), int)
         f_cos = plots.native_bsdf.f_cos(native, wi, np.broadcast_to(wo, wi.shape), every)
@@ -267,7 +267,7 @@ def test_a_lobe_points_where_the_light_goes_and_a_matte_one_up(extension, panel,
 def test_the_nearest_glossy_node_is_as_rough_as_its_own_lobe(plots, extension, panel, empty):
     """Cook and Torrance's microfacets are Beckmann's, similar to GGX: m is about the roughness
     squared."""
-    theta = plots._angles()
+    theta = plots.reflected.angles()
     for roughness in (0.1, 0.35, 0.8):
         found, curve = plots.nearest_glossy(3 * plots.glossy_slice(roughness**2, theta))
         assert found == pytest.approx(roughness, abs=1e-9)
@@ -291,8 +291,10 @@ def node_curve(principled, plots):
     def curve(color, roughness, metallic, ior):
         f0 = ((ior - 1) / (ior + 1)) ** 2
         native = principled.Native("principled", color, roughness, metallic=metallic, f0=f0)
-        light = plots._slice(np.radians(-plots.INCIDENCE))
-        return principled.node_slice(native, plots._slice(plots._angles()), light)
+        light = plots.reflected.in_plane(np.radians(-plots.reflected.INCIDENCE))
+        return principled.node_slice(
+            native, plots.reflected.in_plane(plots.reflected.angles()), light
+        )
 
     return curve
 
@@ -300,8 +302,8 @@ def node_curve(principled, plots):
 def misplaced(plots, curve, expected):
     """The fraction of a curve's area that is misplaced, by the trapezoid rule."""
     area = np.trapezoid if hasattr(np, "trapezoid") else np.trapz
-    off = area(np.abs(curve - expected), plots._angles(), axis=0).sum()
-    return off / area(expected, plots._angles(), axis=0).sum()
+    off = area(np.abs(curve - expected), plots.reflected.angles(), axis=0).sum()
+    return off / area(expected, plots.reflected.angles(), axis=0).sum()
 
 
 @pytest.mark.parametrize(
@@ -318,7 +320,9 @@ def misplaced(plots, curve, expected):
 def test_the_nearest_principled_node_is_the_one_that_is_drawn(plots, principled, node_curve, node):
     color, roughness, metallic, ior = node
     curve = node_curve(*node)
-    found = principled.nearest_principled(curve, plots._angles(), plots.INCIDENCE)
+    found = principled.nearest_principled(
+        curve, plots.reflected.angles(), plots.reflected.INCIDENCE
+    )
     assert found.error < 0.01 and misplaced(plots, found.curve, curve) < 0.01
     assert (found.ior, found.metallic) == (ior, pytest.approx(metallic, abs=0.051))
     assert found.roughness == pytest.approx(roughness, rel=0.01)
@@ -345,10 +349,10 @@ def test_a_matte_surface_is_a_principled_node(extension, panel, plots, empty):
 def test_no_principled_node_beside_it_is_nearer(plots, principled, node_curve, model, values):
     """And its error is as stated, by the squared errors weighted by the angles. A neighbouring node
     may be better within the resolution of the search."""
-    curve = plots.slice_of(plots.brdfc.model(model), values, plots._angles())
-    near = principled.nearest_principled(curve, plots._angles(), plots.INCIDENCE)
+    curve = plots.reflected.slice_of(plots.brdfc.model(model), values, plots.reflected.angles())
+    near = principled.nearest_principled(curve, plots.reflected.angles(), plots.reflected.INCIDENCE)
     assert near.error == pytest.approx(misplaced(plots, near.curve, curve), rel=0.01)
-    area = np.gradient(plots._angles())
+    area = np.gradient(plots.reflected.angles())
 
     def squares(**change):
         node = {k: getattr(near, k) for k in ("color", "roughness", "metallic", "ior")} | change
@@ -370,12 +374,12 @@ def test_the_curve_of_the_principled_node_is_dashed(extension, panel, plots, emp
     picture, near = shown(panel, extension, "cook_torrance", m=0.3)
     red = above(picture)[..., 0]
     model = plots.brdfc.model("cook_torrance")
-    values = plots.values_in_range(model, {"m": 0.3})
-    curve = plots.slice_of(model, values, plots._angles())
+    values = plots.reflected.values_in_range(model, {"m": 0.3})
+    curve = plots.reflected.slice_of(model, values, plots.reflected.angles())
     radius, angle, _ = plots._polar_grid()
 
     def over_peak(c):
-        return np.interp(angle, plots._angles(), 0.95 * c[:, 0] / curve.max())
+        return np.interp(angle, plots.reflected.angles(), 0.95 * c[:, 0] / curve.max())
 
     node, own = over_peak(near.principled.curve), over_peak(curve)
     on = (np.abs(radius - node) < 0.003) & (radius > own + 0.03)
@@ -394,7 +398,7 @@ def of_form(form_light, plots, extension, material, wi, wo):
     each."""
     (node,) = extension.model_nodes.group_nodes(material)
     model = plots.brdfc.model(extension.model_nodes.identity(node).model)
-    values = plots.values_in_range(model, extension.api.get_parameters(material))
+    values = plots.reflected.values_in_range(model, extension.api.get_parameters(material))
     lobes = form_light.lobes(node, plots._complete(model, values), np.array(wo))
     return [lobes.scattered(w[None], slice(i, i + 1))[0] for i, w in enumerate(wi)]
 
@@ -515,13 +519,16 @@ def test_a_form_made_for_other_values_has_its_own_curve(
     material = extension.api.new_material("ward", "fitted", **values)
     extension.pack.use()
     log, legend, picture = legend_of(panel, extension, material)
-    wi, wo = plots._slice(plots._angles())[1:-1], plots._slice(np.radians(-plots.INCIDENCE))
+    wi, wo = (
+        plots.reflected.in_plane(plots.reflected.angles())[1:-1],
+        plots.reflected.in_plane(np.radians(-plots.reflected.INCIDENCE)),
+    )
     wo = np.broadcast_to(wo, wi.shape)
     closures = of_tool(tool, "fitted", "ward", values, (), wi, wo)
     f = helpers.evaluate(tool, "ward", values, wi, wo)
     area = np.trapezoid if hasattr(np, "trapezoid") else np.trapz
-    off = area(np.abs(closures - f * wi[:, 2:]), plots._angles()[1:-1], axis=0).sum()
-    off /= area(f * wi[:, 2:], plots._angles()[1:-1], axis=0).sum()
+    off = area(np.abs(closures - f * wi[:, 2:]), plots.reflected.angles()[1:-1], axis=0).sum()
+    off /= area(f * wi[:, 2:], plots.reflected.angles()[1:-1], axis=0).sum()
     assert legend.form == pytest.approx(off, rel=0.01) and 0.001 < off < 0.05
     said = f"Dotted: render method Fitted, error {100 * off:.2g} %"
     assert said in " ".join(log)
@@ -532,21 +539,28 @@ def test_the_curve_of_a_form_is_dotted(panel, plots, form_light, extension, empt
     else."""
     material = extension.api.new_material("lossless", "twin")
     on = inked(legend_of(panel, extension, material)[2])
-    wi, wo = plots._slice(plots._angles()), plots._slice(np.radians(-plots.INCIDENCE))
+    wi, wo = (
+        plots.reflected.in_plane(plots.reflected.angles()),
+        plots.reflected.in_plane(np.radians(-plots.reflected.INCIDENCE)),
+    )
     (curve,) = of_form(form_light, plots, extension, material, [wi], [wo])
     curve = curve.max(axis=1)
-    own = plots.slice_of(plots.brdfc.model("lossless"), {}, plots._angles()).max(axis=1)
+    own = plots.reflected.slice_of(plots.brdfc.model("lossless"), {}, plots.reflected.angles()).max(
+        axis=1
+    )
     radius, angle, unit = plots._polar_grid()
 
     def over_peak(c):
-        return np.interp(angle, plots._angles(), 0.95 * c / own.max())
+        return np.interp(angle, plots.reflected.angles(), 0.95 * c / own.max())
 
     away = np.abs(over_peak(curve) - over_peak(own)) > 0.1
     near = np.abs(radius - over_peak(curve)) * unit < 1
     assert (near & away).sum() > 50 and 0.2 < on[near & away].mean() < 0.8
     assert not (on & away & (np.abs(radius - over_peak(own)) < 0.02)).any()
     # Where the curve is steep, a line of two pixels covers more of a radius.
-    steep = np.interp(angle, plots._angles(), np.abs(np.gradient(curve, plots._angles())))
+    steep = np.interp(
+        angle, plots.reflected.angles(), np.abs(np.gradient(curve, plots.reflected.angles()))
+    )
     tilt = np.hypot(1, 0.95 / own.max() * steep / np.maximum(radius, 0.02))
     assert (np.abs(radius - over_peak(curve)) * unit / tilt)[on].max() < 3
 
@@ -625,7 +639,7 @@ def test_arrows_are_as_bright_as_the_tools_mirror(
     material = extension.api.new_material(model, **values)
     log, legend, picture = legend_of(panel, extension, material)
     values = {k: extension.api.get_parameters(material)[k] for k in values}
-    cosine = math.cos(math.radians(plots.INCIDENCE))
+    cosine = math.cos(math.radians(plots.reflected.INCIDENCE))
     albedo, mirror = (x[0] for x in helpers.albedo_and_mirror(tool, model, values, [cosine]))
     np.testing.assert_allclose(legend.mirror, mirror, rtol=1e-6)
     assert any(
@@ -633,10 +647,12 @@ def test_arrows_are_as_bright_as_the_tools_mirror(
     )
     through = model in ("glass", "fresnel_dielectric")
     assert (legend.refracted is not None) == through
-    directions = {plots.INCIDENCE: mirror}
+    directions = {plots.reflected.INCIDENCE: mirror}
     if through:
         np.testing.assert_allclose(legend.refracted, albedo - mirror, rtol=1e-6)
-        bent = math.degrees(math.asin(math.sin(math.radians(plots.INCIDENCE)) / values["ior"]))
+        bent = math.degrees(
+            math.asin(math.sin(math.radians(plots.reflected.INCIDENCE)) / values["ior"])
+        )
         directions[180 - bent] = albedo - mirror
     radius, angle, unit = plots._polar_grid(through)
     for degrees, share in directions.items():
@@ -689,7 +705,7 @@ def test_no_smooth_node_beside_it_is_nearer(
     found = light_of(extension, plots, form_light, material)
     near, native = found.near, plots.native_bsdf
     assert near.roughness == 0 and near.error < most and not near.transmission
-    wo = plots._directions()
+    wo = plots.reflected.directions()
     own = plots.brdfc.model(model)
     mirror = own.mirror(wo, **values)
     scattered = found.albedos[0] - mirror
@@ -715,7 +731,7 @@ def test_no_smooth_node_beside_it_is_nearer(
     for node in beside:
         assert least <= 1.001 * squares(*node) + 1e-12, node
     # The error at 45 degrees, as a fraction of the light.
-    light = plots._slice(np.radians(-plots.INCIDENCE))
+    light = plots.reflected.in_plane(np.radians(-plots.reflected.INCIDENCE))
     node = near.native
     shares = native.mirror(node, light[None])[0], own.mirror(light, **values)
     off = np.abs(shares[0] - shares[1]).sum()
@@ -734,7 +750,7 @@ def test_the_arrow_of_the_principled_node_is_dashed(extension, panel, plots, emp
     assert share == pytest.approx(0.7, abs=0.02)
     assert f"Its mirror {100 * share:.3g} %: the dashed arrow" in log
     radius, angle, unit_ = plots._polar_grid()
-    off = angle - math.radians(plots.INCIDENCE)
+    off = angle - math.radians(plots.reflected.INCIDENCE)
     along, across = radius * np.cos(off) * unit_, radius * np.sin(off) * unit_
     beside = np.abs(across - 5) < 0.6
     bright = above(picture)[..., 0] > 0.9
@@ -755,13 +771,13 @@ def test_a_lobe_that_outweighs_its_mirror_has_a_rough_node(extension, panel, emp
 def test_glossy_is_ggx_with_the_light_that_facets_reflect(plots):
     """At normal incidence, narrow GGX lobes lose nothing: the slice, rotated about the normal,
     integrates to 1."""
-    light = plots.INCIDENCE
+    light = plots.reflected.INCIDENCE
     try:
-        plots.INCIDENCE = 0.0
+        plots.reflected.INCIDENCE = 0.0
         theta = np.linspace(0, np.pi / 2, 20001)
         f_cos = plots.glossy_slice(0.05, theta)
     finally:
-        plots.INCIDENCE = light
+        plots.reflected.INCIDENCE = light
     assert np.sum(f_cos * np.sin(theta)) * theta[1] * 2 * np.pi == pytest.approx(1, abs=0.01)
 
 
@@ -770,8 +786,8 @@ def test_glossy_masks_at_grazing_angles_as_cycles_does(plots, roughness):
     """E. Heitz: Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs, JCGT 2014,
     eq. 99 with GGX's Lambda: masking and shadowing are correlated by height."""
     alpha, theta = roughness**2, np.radians([-85.0, -40.0, 0.0, 45.0, 80.0, 89.0])
-    a2, light, out = alpha**2, np.cos(np.radians(plots.INCIDENCE)), np.cos(theta)
-    cosine = np.cos((theta - np.radians(plots.INCIDENCE)) / 2)
+    a2, light, out = alpha**2, np.cos(np.radians(plots.reflected.INCIDENCE)), np.cos(theta)
+    cosine = np.cos((theta - np.radians(plots.reflected.INCIDENCE)) / 2)
     ggx = a2 / (np.pi * (cosine**2 * (a2 - 1) + 1) ** 2)
     both = out * np.sqrt(a2 + (1 - a2) * light**2) + light * np.sqrt(a2 + (1 - a2) * out**2)
     expected = ggx * (2 * light * out / both) / (4 * light)

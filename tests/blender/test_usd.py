@@ -117,12 +117,22 @@ def test_imported_materials_reflect_nearly_the_same_light(extension, empty, expo
 
 
 def test_other_materials_are_exported_as_ever(extension, empty, exporter, tmp_path):
-    helpers.add_balls_of_no_single_model(empty, extension.api)
+    helpers.add_balls_of_other_shaders(empty, extension.api)
     text = _export(tmp_path / "balls.usda")
     for name in ("plain", "coated"):
         assert _surface(text, name)["roughness"] == 0.25
     assert "NearestPrincipled" not in text
-    assert _surface(text, "mixed") is None
+
+
+def test_a_sum_of_models_is_written_as_one_node(extension, empty, exporter, tmp_path):
+    """It used to be written without a shader."""
+    material = extension.api.new_sum(
+        [("lambert", {"rho": rho}) for rho in ((0.4, 0.1, 0.1), (0.1, 0.1, 0.4))]
+    )
+    material.name = "sum"
+    helpers.add_sphere(empty, material, segments=8)
+    found = _surface(_export(tmp_path / "ball.usda"), "sum")["diffuseColor"]
+    assert found == pytest.approx((0.5, 0.2, 0.5), abs=0.01)
 
 
 def test_a_black_material_arrives_black(extension, empty, exporter, tmp_path):
