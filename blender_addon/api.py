@@ -22,7 +22,7 @@ from . import convert, lamps, lean, library, measured
 from .common import argument_checks, editable, enabling, files
 from .common.i18n import say
 from .content.compiler import CompileError
-from .groups import automatic, bump_correction, model_nodes, nodes, stacks, update, usage
+from .groups import automatic, bump_correction, model_nodes, nodes, stacks, tangents, update, usage
 from .groups.update import Update
 from .lamps import Lamp
 from .lean import PlanError
@@ -175,18 +175,21 @@ def new_measured_material(found, model=None, representation="auto"):
 
     `found`: a file, or what measured_fits() returned of it. `model`: one of the models, or "lobes"
     for the sum of several; without it the model that comes closest. Where the fit has a matte part,
-    the light of a Diffuse node is added to the model's. Raises ValueError, and what measured_fits()
-    and new_material() raise.
+    the light of a Diffuse node is added to the model's. Where it is `turned`, nodes turn the
+    tangent. Raises ValueError, and what measured_fits() and new_material() raise.
     """
     if not isinstance(found, Measured):
         found = measured_fits(found)
     if model == measured.SUM:
         return new_sum(found.lobe_sum().lobes, representation, found.path.stem)
     fit = found.fit(model)
-    material = new_material(fit.model, representation, **fit.parameters)
+    material = new_material(fit.model, representation, **fit.used.parameters)
     material.name = found.path.stem
-    if fit.matte:
-        stacks.add_matte(material.node_tree, _the_node(material), fit.matte)
+    node = _the_node(material)
+    if fit.turned:
+        tangents.turn(node, -fit.turned.angle)
+    if fit.used.matte:
+        stacks.add_matte(material.node_tree, node, fit.used.matte)
     return material
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import bpy
 
-from .common.i18n import in_percent, say
+from .common.i18n import say
 from .common.program import ToolJob
 from .packs import pack
 
@@ -28,12 +28,18 @@ class MeasuredError(RuntimeError):
 
 @dataclass(frozen=True)
 class Turned:
-    """How close a model comes once the data are turned about the normal."""
+    """A model that comes close to the data once they are turned about the normal."""
 
     #: Radians, counted from x to y.
     angle: float
-    #: As Fit.error.
+    #: As those of Fit.
     error: float
+    parameters: dict
+    matte: tuple | None
+
+    @classmethod
+    def of_json(cls, entry):
+        return cls(entry["angle"], entry["error"], _values(entry), _color(entry["matte"]))
 
 
 @dataclass(frozen=True)
@@ -59,17 +65,22 @@ class Fit:
         return cls(
             entry["model"],
             _values(entry),
-            tuple(entry["matte"]) if entry["matte"] else None,
+            _color(entry["matte"]),
             entry["error"],
             entry["mirror"],
             tuple(entry["stopped"]),
-            Turned(**entry["turned"]) if entry["turned"] else None,
+            Turned.of_json(entry["turned"]) if entry["turned"] else None,
         )
 
+    @property
+    def used(self):
+        """What a material gets, whose tangent can be turned instead of the data: Turned or Fit."""
+        return self.turned or self
+
     def remarks(self):
-        """What `stopped` and `turned` tell, a sentence each."""
+        """What `stopped` and `turned` tell of the material, a sentence each."""
         said = []
-        if self.stopped:
+        if self.stopped and not self.turned:
             known = pack.model(self.model).parameters
             # This extension may have been built without some of them.
             labels = (known.get(name, {}).get("label", name) for name in self.stopped)
@@ -83,10 +94,8 @@ class Fit:
         if self.turned:
             said.append(
                 say(
-                    "The error would be {percent} % if the data were turned by {angle} degrees "
-                    "about the normal",
-                    percent=in_percent(self.turned.error),
-                    angle=f"{math.degrees(self.turned.angle):.1f}",
+                    "The tangent is turned by {angle} degrees, as the model has no rotation",
+                    angle=f"{-math.degrees(self.turned.angle):.1f}",
                 )
             )
         return said
@@ -144,6 +153,9 @@ class Measured:
             for entry in told.get("sums", ())
             if all(lobe["model"] in pack.model_names() for lobe in entry["lobes"])
         )
+        # The program ranks models without turning them.
+        if any(fit.turned for fit in fits):
+            fits = tuple(sorted(fits, key=lambda fit: fit.used.error + fit.mirror))
         if not fits and not sums:
             raise MeasuredError(say("This extension has no model that scatters light"))
         return cls(
@@ -216,6 +228,10 @@ class Fitting(ToolJob):
 def most_lobes(kind):
     """The largest number of lobes in a sum: "most" in any, "fitted" in one that is fitted."""
     return pack.manifest()["lobes"][kind]
+
+
+def _color(entry):
+    return tuple(entry) if entry else None
 
 
 def _values(entry):

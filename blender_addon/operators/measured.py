@@ -159,7 +159,7 @@ def _fits_as_items(_operator, _context):
                 say(
                     "{model}: error {percent} %",
                     model=pack.model(fit.model).label,
-                    percent=in_percent(fit.error),
+                    percent=in_percent(fit.used.error),
                 )
             ),
             pack.model(fit.model).doc,
@@ -225,8 +225,8 @@ class BRDFC_OT_choose_measured(Operator):
             return
         fit = self.found.fit(self.model)
         said = fit.remarks()
-        if fit.matte:
-            grey = sum(fit.matte) / 3
+        if matte := fit.used.matte:
+            grey = sum(matte) / 3
             said.insert(
                 0,
                 say("A matte surface that reflects {percent} % is added", percent=in_percent(grey)),

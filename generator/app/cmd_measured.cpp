@@ -40,6 +40,13 @@ Json parameters_of(const ParamValues& values) {
   return out;
 }
 
+Json describe(const measured::ModelFit::Turned& t) {
+  return {{"angle", t.angle},
+          {"error", t.error},
+          {"parameters", parameters_of(t.values)},
+          {"matte", t.matte ? rgb(*t.matte) : Json()}};
+}
+
 Json describe(const measured::ModelFit& f) {
   return {{"model", f.model->info().name},
           {"parameters", parameters_of(f.values)},
@@ -47,7 +54,7 @@ Json describe(const measured::ModelFit& f) {
           {"error", f.error},
           {"mirror", f.mirror},
           {"stopped", f.stopped},
-          {"turned", f.turned ? Json{{"angle", f.turned->angle}, {"error", f.turned->error}} : Json()},
+          {"turned", f.turned ? describe(*f.turned) : Json()},
           {"seconds", f.seconds}};
 }
 

@@ -402,10 +402,10 @@ struct Compared {
 
 /// How close a problem comes if the data are turned about the normal, where the tangent is near an angle.
 ModelFit::Turned turned_near(Problem& problem, const Compared& data, bool matte, double angle) {
+  std::optional<Rgb<double>> added;
+  if (matte) added = Rgb<double>(0);
   const auto error = [&](const std::vector<double>& t, const Pairs& pairs) {
     problem.set_numbers(t);
-    std::optional<Rgb<double>> added;
-    if (matte) added = Rgb<double>(0);
     return problem.solve(pairs, added);
   };
   const std::size_t n = problem.searched().size();
@@ -428,7 +428,8 @@ ModelFit::Turned turned_near(Problem& problem, const Compared& data, bool matte,
   angle = best[n];
   best.pop_back();
   // The data have to be turned the other way. Half a turn changes nothing.
-  return {-std::remainder(angle, kPi), error(best, seen_turned(data.last, angle))};
+  const double last = error(best, seen_turned(data.last, angle));
+  return {-std::remainder(angle, kPi), last, problem.values(), added};
 }
 
 /// The same for the data's axes. A model may be wide along either of its own.

@@ -28,11 +28,13 @@ struct ModelFit {
   double seconds = 0;
   /// Numbers whose search ended at the end of what the model accepts, or of what data resolve.
   std::vector<std::string> stopped = {};
-  /// How close an anisotropic model without an angle of its own comes once the data are turned about the normal,
-  /// counted from x to y, if that is much closer.
+  /// The fit of an anisotropic model without an angle of its own to data that are turned about the normal, counted from
+  /// x to y, if it comes much closer.
   struct Turned {
     double angle = 0;  ///< radians
     double error = 0;
+    ParamValues values = {};
+    std::optional<Rgb<double>> matte = {};
   };
   std::optional<Turned> turned = {};
 };

@@ -54,12 +54,14 @@ def _json(*arguments: str):
 
 @dataclass(frozen=True)
 class Turned:
-    """How close a model comes once the data are turned about the normal."""
+    """A model that comes close to the data once they are turned about the normal."""
 
     #: Radians, counted from x to y.
     angle: float
-    #: As Fit.error.
+    #: As those of Fit.
     error: float
+    parameters: dict[str, float | tuple[float, float, float] | str]
+    matte: tuple[float, float, float] | None
 
 
 @dataclass(frozen=True)
@@ -149,7 +151,7 @@ class Measured:
                 f["error"],
                 f["mirror"],
                 tuple(f["stopped"]),
-                Turned(**f["turned"]) if f["turned"] else None,
+                _turned(f["turned"]) if f["turned"] else None,
             )
             for f in _json(self.path, *options)["fits"]
         ]
@@ -178,6 +180,10 @@ def _plain(value):
 
 def _values(entry):
     return {name: _plain(value) for name, value in entry["parameters"].items()}
+
+
+def _turned(entry) -> Turned:
+    return Turned(entry["angle"], entry["error"], _values(entry), _plain(entry["matte"]))
 
 
 def measured(path: str | PathLike[str]) -> Measured:
