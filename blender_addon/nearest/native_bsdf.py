@@ -181,6 +181,21 @@ def facets(wi, wo, alpha, beckmann=False):
     return distribution(half(wi, wo), alpha, beckmann) / (4 * wo[..., 2] * shadow)
 
 
+def refracting_facets(wi, wo, alpha, ior):
+    """f |cos(theta_i)| of GGX facets for light from below, wi.z < 0, in a medium with this relative
+    IOR; as Cycles evaluates them. Walter et al. 2007, eq. 21, with masking whose heights are
+    correlated; f counts energy, as models do."""
+    h = -(wo + ior * wi)
+    length = np.linalg.norm(h, axis=-1)
+    h = h * (np.sign(h[..., 2]) / np.maximum(length, 1e-12))[..., None]
+    of_o, of_i = (h * wo).sum(-1), (h * wi).sum(-1)
+    passes = (of_o > 0) & (of_i < 0)
+    left = 1 - dielectric(((ior - 1) / (ior + 1)) ** 2, of_o)
+    shadow = 1 + _shadow(wi, alpha, False) + _shadow(wo, alpha, False)
+    jacobian = ior**2 * of_o * -of_i / np.maximum(length, 1e-12) ** 2
+    return passes * left * distribution(h, alpha, False) * jacobian / (wo[..., 2] * shadow)
+
+
 def draw_facets(u, alpha, beckmann=False):
     """Samples microfacet normals (n, 3) in proportion to D(h) cos, from numbers u (n, 2)."""
     r = np.sqrt(-np.log1p(-u[:, 0])) if beckmann else np.sqrt(u[:, 0] / (1 - u[:, 0]))

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finds the Principled node nearest to a material. Independent of bpy.
 
-The node has no coat, sheen and the like: only roughness, metallic, IOR and base colour. The first
-three are searched on a grid; the colour follows by least squares. Nodes are evaluated by the
-formulas of native_bsdf.py, and the error is that of these formulas. A rough node is fitted to a
-curve in the plane of incidence. A smooth node, which has ideal mirror reflection, is fitted to
-albedos over the view angle.
+The node has no coat, sheen and the like: only roughness, metallic, IOR and base colour, or all of
+the transmission. The first three are searched on a grid; the colour follows by least squares. Nodes
+are evaluated by the formulas of native_bsdf.py, and the error is that of these formulas. A rough
+node is fitted to a curve in the plane of incidence. A smooth node, which has ideal mirror
+reflection, is fitted to albedos over the view angle.
 """
 
 import dataclasses
 import functools
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,7 +40,8 @@ class Nearest:
     curve: np.ndarray
     #: Fraction of the light from INCIDENCE that the node misplaces.
     error: float
-    #: Whether the base transmits: the input Transmission is 1.
+    #: Whether the base transmits: the input Transmission is 1. Each time light passes, it is
+    #: multiplied by the root of the base colour.
     transmission: bool = False
     #: Fractions (3,) of light from INCIDENCE that are ideally reflected and refracted.
     mirror: tuple = (0.0, 0.0, 0.0)
@@ -47,7 +49,9 @@ class Nearest:
 
     @property
     def native(self):
-        return _native(self.roughness, self.metallic, self.ior, self.color)
+        """With the colour that light gets which passes the surface once, if the base transmits."""
+        color = tuple(np.sqrt(self.color)) if self.transmission else self.color
+        return _native(self.roughness, self.metallic, self.ior, color)
 
 
 #: The node that reflects nothing, which no search finds.
@@ -260,7 +264,7 @@ def _smooth_node(curve, search, cosines, shares, here):
     """The smooth Nearest node; its error is a fraction of all light, from 0 to 2."""
     through = bool(shares.refracted.any())
     metallic, ior, color = _smooth(shares, cosines, through)
-    native = _native(0.0, metallic, ior, tuple(float(c) for c in color))
+    native = _native(0.0, metallic, ior, tuple(map(float, color)))
     each = search.wo[None]
     mirror = native_bsdf.mirror(native, each)[0]
     base = (1 - metallic) * (1 - native_bsdf.view_terms(native, each).taken) * color
@@ -272,7 +276,51 @@ def _smooth_node(curve, search, cosines, shares, here):
     else:
         off += scattered.sum()
     arrows = tuple(mirror.tolist()), tuple(refracted.tolist())
-    return Nearest(0.0, metallic, ior, native.color, found, float(off), through, *arrows)
+    color = tuple(map(float, color**2 if through else color))
+    return Nearest(0.0, metallic, ior, color, found, float(off), through, *arrows)
+
+
+#: Angles, in radians, and directions of light below the surface in the plane of incidence.
+BELOW = np.linspace(-np.pi / 2, np.pi / 2, 723)[1:-1]
+FROM_BELOW = np.stack([np.sin(BELOW), 0 * BELOW, -np.cos(BELOW)], -1)
+#: The search grid of rough nodes that transmit, around which finer ones follow.
+_FROSTED_ROUGHNESS, _FROSTED_IOR = np.geomspace(1, 0.03, 16), np.linspace(1.05, 2.55, 16)
+
+
+def _frosted(curve, below, search):
+    """The rough Nearest node that transmits; `below`: as in nearest()."""
+    wi = np.concatenate([search.wi, FROM_BELOW])
+    area = np.concatenate([search.area, np.gradient(BELOW)])
+    wanted, above = np.concatenate([curve, below]), len(search.wi)
+
+    def found(roughness, ior):
+        alpha, f0 = (roughness**2,) * 2, ((ior - 1) / (ior + 1)) ** 2
+        cosine = native_bsdf.half(search.wi, search.wo) @ search.wo
+        wo = np.broadcast_to(search.wo, wi.shape)
+        gloss = native_bsdf.dielectric(f0, cosine) * native_bsdf.facets(
+            search.wi, wo[:above], alpha
+        )
+        through = native_bsdf.refracting_facets(FROM_BELOW, wo[above:], alpha, ior)
+        square = max(float((area[above:] * through) @ through), 1e-30)
+        tint = np.clip((area[above:] * through) @ below / square, 0, 1)
+        return tint, np.concatenate([np.stack([gloss] * 3, -1), through[:, None] * tint])
+
+    def off(node):
+        return float((area @ (found(*node)[1] - wanted) ** 2).sum())
+
+    grid = itertools.product(_FROSTED_ROUGHNESS, _FROSTED_IOR)
+    roughness, ior = min(grid, key=off)
+    for width in (1.0, 0.2):
+        around = (
+            roughness * np.geomspace(1.25, 0.8, 9) ** width,
+            ior + width * np.linspace(-0.1, 0.1, 9),
+        )
+        grid = itertools.product(np.clip(around[0], 0.02, 1), np.maximum(around[1], 1.0))
+        roughness, ior = min(grid, key=off)
+    tint, node = found(roughness, ior)
+    color = tuple(map(float, tint**2))
+    error = misplaced(node, wanted, area)
+    return Nearest(float(roughness), 0.0, float(ior), color, node[:above], error, True)
 
 
 def color_like(near, curve, angles, incidence, cosines, shares):
@@ -284,12 +332,14 @@ def color_like(near, curve, angles, incidence, cosines, shares):
     return _smooth_best(shares, cosines, *given, near.transmission)[-1]
 
 
-def nearest(curve, angles, incidence, cosines, shares, here):
+def nearest(curve, angles, incidence, cosines, shares, here, below):
     """The node Nearest to a material; None if it reflects nothing.
 
     `curve`: f cos (N, 3) of the material at `angles`, in radians, for light from the angle
-    -incidence, in degrees. `shares`: its Shares at the view `cosines`; `here`: at the angle of
-    incidence."""
+    -incidence, in degrees. `below`: the same FROM_BELOW. `shares`: its Shares at the view
+    `cosines`; `here`: at the angle of incidence."""
+    if below.any():
+        return _frosted(curve, below, _search(incidence, angles.tobytes()))
     rough = nearest_principled(curve, angles, incidence)
     ideal = float(here.mirror.sum() + here.refracted.sum())
     if not ideal > 0:

@@ -113,7 +113,9 @@ def _legend(node, legend):
             ior=f"{near.ior:.2f}",
         )
         shares = {"mirror": _shares(near.mirror), "refracted": _shares(near.refracted)}
-        if near.transmission:
+        if near.transmission and near.roughness > 0:
+            yield say("Its transmission 1")
+        elif near.transmission:
             yield say("Its transmission 1, mirror {mirror} %, refracted {refracted} %", **shares)
         elif any(near.mirror):
             yield say("Its mirror {mirror} %: the dashed arrow", mirror=shares["mirror"])

@@ -9,6 +9,7 @@ Principled node as a dashed one. The only use of Blender here is its conversion 
 screen's.
 """
 
+import dataclasses
 import functools
 from dataclasses import dataclass
 
@@ -379,7 +380,9 @@ def _of_node(near):
     taken, *rest = (np.interp(viewers[:, 2], reflected.views()[::-1], x[::-1]) for x in columns)
     gloss, metal = np.stack(rest[:3], axis=-1), np.stack(rest[3:], axis=-1)
     of_view = native_bsdf.ViewTerms(taken, gloss, metal)
-    f_cos = native_bsdf.f_cos_of_view(native, wi, viewers, of_view) * (not near.transmission)
+    # What the base lets through does not light the ball.
+    lit = dataclasses.replace(native, color=(0.0, 0.0, 0.0)) if near.transmission else native
+    f_cos = native_bsdf.f_cos_of_view(lit, wi, viewers, of_view)
     ball = ball_light(f_cos, native_bsdf.mirror(native, viewers))
     return near.curve, native_bsdf.albedo(native, wo, terms), ball
 

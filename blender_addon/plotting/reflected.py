@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import brdfc
-from ..nearest.principled import Shares, color_like, nearest
+from ..nearest.principled import FROM_BELOW, Shares, color_like, nearest
 
 #: The angle of the incident light in the plane of incidence, in degrees.
 INCIDENCE = 45.0
@@ -73,6 +73,8 @@ class Reflected:
 
     #: f cos over angles(), (N, 3), for light from INCIDENCE.
     curve: np.ndarray
+    #: f |cos| FROM_BELOW, (M, 3), towards the direction of that light.
+    below: np.ndarray
     #: Its Shares at the views, (VIEWS, 3) each, and for light from INCIDENCE.
     shares: Shares
     here: Shares
@@ -84,7 +86,8 @@ class Reflected:
 
     def nearest(self):
         """The Principled node Nearest to it; None if it reflects nothing."""
-        return nearest(self.curve, angles(), INCIDENCE, views(), self.shares, self.here)
+        given = self.shares, self.here, self.below
+        return nearest(self.curve, angles(), INCIDENCE, views(), *given)
 
     def color_for(self, near):
         """The base colour (3,) with which a Nearest node, whose other inputs stay, comes nearest to
@@ -97,6 +100,7 @@ class Reflected:
 
         return Reflected(
             self.curve + other.curve,
+            self.below + other.below,
             both(self.shares, other.shares),
             both(self.here, other.here),
         )
@@ -108,7 +112,8 @@ class Reflected:
         def times(shares, by):
             return Shares(shares.mirror * by, shares.scattered * by, shares.refracted * by)
 
-        return Reflected(self.curve * here, times(self.shares, at_views), times(self.here, here))
+        shares = times(self.shares, at_views), times(self.here, here)
+        return Reflected(self.curve * here, self.below * here, *shares)
 
     def over(self, below):
         """Both, of which the lower one gets what this one leaves: 1 minus the largest channel of
@@ -126,7 +131,9 @@ def of_model(model, values):
     shares = Shares(mirror, np.maximum(albedo - mirror - refracted, 0), refracted)
     scattered = np.array([np.interp(INCIDENCE, degrees(), c) for c in shares.scattered.T])
     here = Shares(model.mirror(here, **values), scattered, model.transmit(here, **values))
-    return Reflected(slice_of(model, values, angles()), shares, here)
+    light = in_plane(np.radians(-INCIDENCE))
+    below = model.eval(FROM_BELOW, light, **values) * -FROM_BELOW[:, 2:]
+    return Reflected(slice_of(model, values, angles()), below, shares, here)
 
 
 def nothing():
@@ -135,4 +142,5 @@ def nothing():
     def none(*shape):
         return Shares(*np.zeros((3, *shape, 3)))
 
-    return Reflected(np.zeros((len(angles()), 3)), none(VIEWS), none())
+    black = np.zeros((len(angles()), 3)), np.zeros((len(FROM_BELOW), 3))
+    return Reflected(*black, none(VIEWS), none())

@@ -65,11 +65,21 @@ def _mix(api):
     return material
 
 
+def _tinted(api):
+    return api.new_material("fresnel_dielectric", refracted=(0.5, 0.7, 0.9))
+
+
+def _frosted(api):
+    return api.new_material("rough_glass", alpha=0.2, refracted=(0.5, 0.7, 0.9))
+
+
 @pytest.mark.parametrize(
-    "make, most", [(_sum, 0.2), (_layers, 0.05), (_mix, 0.03)], ids=["sum", "layers", "mix"]
+    "make, most",
+    [(_sum, 0.05), (_layers, 0.03), (_mix, 0.01), (_tinted, 1e-3), (_frosted, 0.05)],
+    ids=["sum", "layers", "mix", "glass", "frosted"],
 )
-def test_one_node_stands_for_several(extension, empty, make, most):
-    """They used to be exported white."""
+def test_one_node_stands_for_all(extension, empty, make, most):
+    """Several used to be exported white, coloured glass too bright, and frosted glass opaque."""
     material = make(extension.api)
     before = _state(material)
     off = _misplaced(empty, material, lambda: extension.api.replace_by_principled(material))

@@ -22,6 +22,7 @@ MODELS = {
     "coupled": ({"rm": (0.1, 0.3, 0.6)}, 0.03),
     "fresnel_dielectric": ({"ior": 1.45}, 0.05),
     "oren_nayar": ({}, 0.03),
+    "rough_glass": ({"alpha": 0.2}, 0.1),
 }
 
 
@@ -94,14 +95,15 @@ def test_materials_are_written_as_the_nearest_principled_nodes(
 
 def _light(scene):
     """By ball: its pixels, in blocks of 4 x 4."""
-    helpers.add_camera(scene, (5, -6, 0), orthographic=12.5)
+    count = len(MODELS)
+    helpers.add_camera(scene, (1.25 * (count - 1), -6, 0), orthographic=2.5 * count)
     helpers.add_world(scene, 0.3)
     helpers.add_lamp(scene, "SUN", turn=(0.7, 0.3, 0), energy=2, angle=0.5)
     scene.render.engine, scene.cycles.samples = "CYCLES", 64
     scene.cycles.use_denoising = False
-    scene.render.resolution_x, scene.render.resolution_y = 5 * 24, 24
-    blocks = helpers.render(scene)[..., :3].reshape(6, 4, 30, 4, 3).mean((1, 3))
-    return np.split(blocks, 5, 1)
+    scene.render.resolution_x, scene.render.resolution_y = count * 24, 24
+    blocks = helpers.render(scene)[..., :3].reshape(6, 4, 6 * count, 4, 3).mean((1, 3))
+    return np.split(blocks, count, 1)
 
 
 def test_imported_materials_reflect_nearly_the_same_light(extension, empty, exporter, tmp_path):
