@@ -258,7 +258,9 @@ def of_page(demo):
     return {
         "name": demo.file.name,
         "about": demo.about,
-        "facts": [f"{demo.kind}.", *demo.told["notes"], *demo.told["lacks"]],
+        "facts": [
+            f"{t[0].upper()}{t[1:]}." for t in (demo.kind, *demo.told["notes"], *demo.told["lacks"])
+        ],
         "data": source(demo.folder / "data.png"),
         "fits": [
             {

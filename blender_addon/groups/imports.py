@@ -1,60 +1,131 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Replaces the groups that an appended or dragged material brings by equal groups of the file,
-removes the lamps of the other file that these groups bring, and updates the list of lamps.
+"""Replaces the groups that an appended, dragged or pasted material brings by equal groups of the
+file, removes the lamps of the other file that these groups bring, and updates the list of lamps.
 
 Blender itself would add another copy with each drag if the file has made its own group.
 """
+
+import re
+from pathlib import Path
 
 import bpy
 from bpy.app.handlers import persistent
 
 from .. import lamps
-from ..common import app_handlers
+from ..common import app_handlers, copy_buffer
 from ..content import part_groups
 from . import automatic, choice_sockets, model_nodes, nodes
+
+#: Names of the objects of linked files that are in no collection, and the session's numbers of the
+#: file's own objects, where a list of lamps is linked.
+_hidden, _own = set(), set()
 
 
 def _dependencies(context, kind):
     """The blocks of a kind that were imported as dependencies. Those that the user asked for by
     name must stay, as Blender goes on to use them."""
+    copied = _copied(context)
     return [
         item.id
         for item in context.import_items
         if item.id_type == kind
         and item.append_action == "MAKE_LOCAL"
-        and "INDIRECT_USAGE" in item.import_info
+        and _is_dependency(item, copied)
         and item.id is not None
         and item.id.library is None
     ]
+
+
+def _is_dependency(item, copied):
+    if copied is not None and item.id_type == "OBJECT":
+        return item.name not in copied
+    return "INDIRECT_USAGE" in item.import_info
+
+
+def _copied(context):
+    """The names of the objects that the user copied, if this is a paste; None if it is not."""
+    paths = {item.source_library.filepath for item in context.import_items if item.source_library}
+    if {Path(path).name for path in paths} != {copy_buffer.NAME}:
+        return None
+    try:
+        return copy_buffer.copied_objects(*paths)
+    except (ValueError, OSError):  # written by a Blender that is not known yet
+        return None
 
 
 def _remove_lamps(context, groups):
     """Removes the imported objects that nothing reads but the lists of lamps among `groups`, by
     drivers. Blender puts them in the scene, where they would shine."""
     lists = {group for group in groups if lamps.is_group(group)}
-    objects = set(_dependencies(context, "OBJECT")) if lists else set()
+    if not lists:
+        return
     imported = {item.id for item in context.import_items}
+    idle = _only_listed(_dependencies(context, "OBJECT"), lists, imported)
+    held = {one.data for one in idle} - {None}
+    bpy.data.batch_remove(idle)
+    bpy.data.batch_remove([data for data in held if data.users == 0])
+
+
+def _only_listed(objects, lists, asked_for=frozenset()):
+    """The objects that nothing reads but these lists, scenes and collections that nobody
+    `asked_for`, and one another."""
+    users, idle = bpy.data.user_map(subset=objects), set()
 
     def is_needed(user):
         in_scene = isinstance(user, bpy.types.Scene | bpy.types.Collection)
-        return user not in lists and not (in_scene and user not in imported)
+        return user not in lists | idle and not (in_scene and user not in asked_for)
 
-    # A parent is idle once its children are removed.
-    while idle := _idle(objects, is_needed):
-        objects -= idle
-        held = {one.data for one in idle} - {None}
-        bpy.data.batch_remove(idle)
-        bpy.data.batch_remove([data for data in held if data.users == 0])
+    # A parent is idle once its children are.
+    while more := {one for one in users if one not in idle and not any(map(is_needed, users[one]))}:
+        idle |= more
+    return idle
 
 
-def _idle(objects, is_needed):
-    """The objects of which is_needed(user) is false for all users."""
-    users = bpy.data.user_map(subset=objects)
-    return {one for one in objects if not any(map(is_needed, users[one]))}
+def _leave_out_lamps(scene):
+    """Takes objects out of the scene that Blender's Make Local > All put there, as the lists of
+    lamps of linked materials read them. Blender may hold pointers to them while handlers run, so
+    they are not removed; without a user they are not saved."""
+    global _hidden, _own
+    lists = {group for group in bpy.data.node_groups if lamps.is_group(group)}
+    came = _hidden and [one for one in scene.objects if _has_come(one)]
+    for one in _only_listed(came, lists) if came else ():
+        for collection in one.users_collection:
+            collection.objects.unlink(one)
+    objects = bpy.data.objects if any(group.library for group in lists) else ()
+    _hidden = {_stem(one) for one in objects if one.library and not one.users_collection}
+    _own = {one.session_uid for one in objects if not one.library}
+
+
+def _has_come(item):
+    """Whether an object is a local copy of one that was hidden. Blender numbers it if its name is
+    taken."""
+    return item.library is None and item.session_uid not in _own and _stem(item) in _hidden
+
+
+def _stem(item):
+    return re.sub(r"\.\d+$", "", item.name)
+
+
+@persistent
+def _after_update(scene, _):
+    _leave_out_lamps(scene)
+
+
+def _is_last(handler, handlers):
+    """Whether a handler is the last of those of an event, behind which it puts itself otherwise.
+    Those that other add-ons added later would meet pointers to blocks that it has removed."""
+    if handlers[-1] != handler:
+        handlers.append(handler)
+        return False
+    while handlers.index(handler) < len(handlers) - 1:
+        handlers.remove(handler)  # the first
+    return True
 
 
 @persistent
 def _after_import(context):
+    if not _is_last(_after_import, bpy.app.handlers.blend_import_post):
+        return
     imported = _dependencies(context, "NODETREE")
     _remove_lamps(context, imported)
     # Each further append examines all that the file has, many times.
@@ -72,11 +143,15 @@ def _after_import(context):
         nodes.merge_duplicates(
             [group for group in bpy.data.node_groups if group.session_uid in known]
         )
+    _leave_out_lamps(bpy.context.scene)
+
+
+_HANDLERS = {"blend_import_post": _after_import, "depsgraph_update_post": _after_update}
 
 
 def register():
-    app_handlers.register({"blend_import_post": _after_import})
+    app_handlers.register(_HANDLERS)
 
 
 def unregister():
-    app_handlers.unregister({"blend_import_post": _after_import})
+    app_handlers.unregister(_HANDLERS)

@@ -104,6 +104,80 @@ def test_what_is_appended_brings_no_lamps_but_those_asked_for(
     assert len(aimed_at) == 1 + keys and own.name in [lamp.name for lamp in aimed_at]
 
 
+@pytest.mark.parametrize("elsewhere", [False, True], ids=["same file", "other file"])
+@pytest.mark.parametrize(
+    "copied", [["Studio Ball"], ["Studio Ball", "Studio Rim"], ["Studio Key"]], ids=" ".join
+)
+def test_what_is_pasted_brings_no_lamps_but_those_that_were_copied(
+    extension, studio, copied, elsewhere
+):
+    """Blender pastes all that the copied objects depend on, so each paste added all lamps of the
+    list, which shone."""
+    bpy.ops.wm.open_mainfile(filepath=str(studio))
+    for item in bpy.context.scene.objects:
+        item.select_set(item.name in copied)
+    bpy.ops.view3d.copybuffer()
+    if elsewhere:
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        extension.api.new_material("phong")
+    had = set(bpy.data.objects)
+    for _ in range(2):
+        bpy.ops.view3d.pastebuffer()
+    wanted = copied + ["Studio Rig"] * ("Studio Rim" in copied)
+    found = [item.name.split(".")[0] for item in bpy.data.objects if item not in had]
+    assert sorted(found) == sorted(2 * wanted)
+    listed = {lamp.name for lamp in extension.api.see_lamps(bpy.context.scene) if lamp.slot}
+    assert listed == {item.name for item in bpy.context.scene.objects if item.type == "LIGHT"}
+
+
+def test_a_copy_buffer_of_another_layout_counts_as_copied_whole(extension, tmp_path):
+    copy_buffer = import_module(f"{extension.package}.common.copy_buffer")
+    path = tmp_path / copy_buffer.NAME
+    for data in (b"", b"BLENDER-v405GLOB", b"BLENDER17-01v0502DNA1" + 80 * b"\xff", b"\x1f\x8b..."):
+        path.write_bytes(data)
+        with pytest.raises(ValueError):
+            copy_buffer.copied_objects(path)
+
+
+@pytest.mark.parametrize("own", [[], ["Studio Key"]], ids=["empty", "namesake"])
+def test_make_local_brings_no_lamps(extension, studio, empty, own):
+    """Blender's Make Local > All puts objects into the scene that only lists of lamps read."""
+    for name in own:
+        add_lamp(empty, "POINT", name)
+    with bpy.data.libraries.load(str(studio), link=True) as (_, to):
+        to.objects = ["Studio Ball"]
+    (ball,) = to.objects
+    empty.collection.objects.link(ball)
+    bpy.context.view_layer.update()
+    bpy.context.view_layer.objects.active = ball
+    ball.select_set(True)
+    bpy.ops.object.make_local(type="ALL")
+    bpy.context.view_layer.update()
+    assert sorted(item.name for item in empty.objects) == ["Studio Ball", *own]
+    assert bpy.context.object.active_material.library is None
+    assert [lamp.name for lamp in extension.api.see_lamps(empty) if lamp.slot] == own
+
+
+def test_other_handlers_of_imports_come_first(extension, studio, empty):
+    """Those behind would meet pointers to blocks that are gone, and Blender would crash."""
+    handlers, seen = bpy.app.handlers.blend_import_post, []
+    before = list(handlers)
+
+    def note(context):
+        seen.append([item.id.name for item in context.import_items if item.id])
+
+    handlers.append(note)
+    try:
+        for kind, name in 2 * [("Material", "Studio Metal"), ("Object", "Studio Ball")]:
+            bpy.ops.wm.append(directory=f"{studio}/{kind}/", filename=name)
+        assert handlers[:] == [*before[:-1], note, before[-1]]
+    finally:
+        handlers.remove(note)
+    assert len(seen) == 4 and all("Studio Rim" in names for names in seen)
+    assert handlers[:] == before
+    assert not [item for item in bpy.data.objects if item.type == "LIGHT"]
+
+
 def slots(scene, update=True):
     """The twelve numbers of each filled slot, as Cycles gets them from the evaluated group, without
     what codes() returns."""
