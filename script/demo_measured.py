@@ -259,7 +259,8 @@ def of_page(demo):
         "name": demo.file.name,
         "about": demo.about,
         "facts": [
-            f"{t[0].upper()}{t[1:]}." for t in (demo.kind, *demo.told["notes"], *demo.told["lacks"])
+            f"{said[0].upper()}{said[1:].removesuffix('.')}."
+            for said in (demo.kind, *demo.told["notes"], *demo.told["lacks"])
         ],
         "data": source(demo.folder / "data.png"),
         "fits": [

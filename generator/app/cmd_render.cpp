@@ -110,12 +110,14 @@ void add_render_command(Command app) {
                   "the picture then shows those that are not")
       .is_member({"camera", "lamps", "lamps-swapped"})
       .capture_default_str();
-  command.add_option("--preview", options->preview, "Also write a PNG for display");
-  command.add_option(
-      "--view", options->view,
-      "View transform of the preview, from the OpenColorIO configuration that the environment variable OCIO\n"
-      "names, for example AgX in Blender's (default: Standard, or the display's default if there is none)");
-  add_number(command, "--exposure", options->exposure, {-64, 64}, "Exposure of the preview in stops");
+  const Option preview = command.add_option("--preview", options->preview, "Also write a PNG for display");
+  command
+      .add_option(
+          "--view", options->view,
+          "View transform of the preview, from the OpenColorIO configuration that the environment variable OCIO\n"
+          "names, for example AgX in Blender's (default: Standard, or the display's default if there is none)")
+      .needs(preview);
+  add_number(command, "--exposure", options->exposure, {-64, 64}, "Exposure of the preview in stops").needs(preview);
   command.callback([options] {
     const std::filesystem::path out(options->out);
     if (out.extension() != ".exr") input_error("--out {}: expected a file name that ends in .exr", out.string());

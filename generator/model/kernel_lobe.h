@@ -205,11 +205,7 @@ template <class T, class Knots> struct KernelLobe {
                            F = named("F", B(v) + drop(g, v));
                            dF = A(v) + A(g - v);
                          }
-                         const auto below = F < target;
-                         const T lo = select(below, v, s[0]), hi = select(below, s[1], v);
-                         const T newton = named("newton", v - (F - target) / maximum(dF, tiny<T>()));
-                         const auto inside = newton >= lo && newton <= hi;
-                         return std::array<T, 3>{lo, hi, select(inside, newton, (lo + hi) / T(2))};
+                         return bracketed_newton(s, F - target, dF);
                        });
     return state[2];
   }

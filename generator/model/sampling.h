@@ -38,6 +38,19 @@ std::array<Expr, N> newton_iterate(int count, const std::array<Expr, N>& state, 
   return iterate(count, state, step);
 }
 
+/// The next state (low, high, v) of Newton's method for an increasing function of v >= 0 with its root in the bracket:
+/// `off` is its value and `slope` its derivative at v. The middle of the bracket is taken where the step leaves it by
+/// more than rounding does: near the root the middle would be far off, and the last of a fixed number of steps is not
+/// mended by another.
+template <class T> std::array<T, 3> bracketed_newton(const std::array<T, 3>& s, const T& off, const T& slope) {
+  const T v = s[2];
+  const auto below = off < T(0);
+  const T lo = select(below, v, s[0]), hi = select(below, s[1], v);
+  const T newton = named("newton", v - off / maximum(slope, tiny<T>()));
+  const auto inside = newton >= T(0.9999) * lo && newton <= T(1.0001) * hi;
+  return {lo, hi, select(inside, newton, (lo + hi) / T(2))};
+}
+
 /// True if both directions are above the surface; elsewhere the BRDF is 0.
 template <class T> auto above(const Vec3<T>& wi, const Vec3<T>& wo) { return wi.z > T(0) && wo.z > T(0); }
 

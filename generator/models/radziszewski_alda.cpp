@@ -224,12 +224,7 @@ template <class T> struct RadziszewskiAlda {
           const T F = named("F", c0 * t + S * (c1 + c2 * u1 / T(2) + c3 * u2 / T(3) + c4 * u3 / T(4) + c5 * u4 / T(5)));
           const T w = named("w", a + b * C);
           const T dF = w * w * w * w * w;
-          const auto below = F < target;
-          const T lo = select(below, t, s[0]), hi = select(below, s[1], t);
-          const T newton = named("newton", t - (F - target) / maximum(dF, tiny<T>()));
-          const T middle = (lo + hi) / T(2);
-          const auto inside = newton >= lo && newton <= hi;
-          return std::array<T, 3>{lo, hi, select(inside, newton, middle)};
+          return bracketed_newton(s, F - target, dF);
         });
     const T psi = named("psi", state[2] / T(2));
     const T C = cos(psi), S = sin(psi);

@@ -80,6 +80,16 @@ class OiioLibrary : public Library {
       reason = in->geterror();
       return nullptr;
     }
+    // Cycles multiplies colours by an alpha that is not in them yet, but not what has one channel.
+    if (spec.nchannels == 2 && spec.alpha_channel == 1) {
+      OIIO::ImageSpec as_stored;
+      as_stored.attribute("oiio:UnassociatedAlpha", 1);
+      in->close();
+      if (!in->open(path.string(), spec, as_stored)) {
+        reason = in->geterror();
+        return nullptr;
+      }
+    }
     return std::make_unique<OiioReader>(std::move(in), spec);
   }
 

@@ -88,6 +88,18 @@ def test_what_is_not_finite_is_black_and_what_is_negative_stays(tmp_path):
     assert means[0] == pytest.approx(means[1], rel=0.05)
 
 
+@pytest.mark.parametrize("alpha", [128, 20, 0])
+@pytest.mark.parametrize("colour, channels", [(4, 1), (6, 3)], ids=["grey", "rgb"])
+def test_alpha_darkens_colours_but_not_what_has_one_channel(tmp_path, colour, channels, alpha):
+    """As in Cycles, whose own pictures of such files Blender 4.5 and 5.2 gave."""
+    row = bytes([0, *2 * [*channels * [200], alpha]])
+    (tmp_path / "sky.png").write_bytes(png(2, 1, colour, row))
+    found, _ = as_sky(tmp_path, "sky.png")
+    stored = 200 / 255 * (1 if channels == 1 else alpha / 255)
+    linear = ((stored + 0.055) / 1.055) ** 2.4 if stored > 0.04045 else stored / 12.92
+    np.testing.assert_allclose(found[..., :3], linear, atol=0.01)
+
+
 def test_a_texture_beyond_the_range_ends_there(tmp_path):
     write(tmp_path / "t.exr", [[[0.5, -6e-8, 0.5], [1.25, np.nan, 0.5]], [[0.5] * 3] * 2])
     texture = {"texture": {"image": "t.exr"}}
@@ -178,16 +190,19 @@ def test_an_environment_has_a_colorspace(tmp_path):
 # ---- files that are none ------------------------------------------------------------------------
 
 
-def png(width, height):
-    """An image without its end."""
+def png(width, height, colour=2, rows=None):
+    """An image of 8 bits with this type of colour, without its end if there are no `rows`."""
 
     def chunk(name, data):
         return (
             struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
         )
 
-    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", b"\x78\x9c")
+    head = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, colour, 0, 0, 0))
+    if rows is None:
+        return b"\x89PNG\r\n\x1a\n" + head + chunk(b"IDAT", b"\x78\x9c")
+    content = chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + head + content
 
 
 @pytest.mark.parametrize(

@@ -120,7 +120,7 @@ def test_a_page_of_a_file_of_any_name(tmp_path):
     assert len(set(re.findall(r'src="a%20%26%20%231/[\w.-]+"', page))) == 1 + 4 * 3
     assert page.count("src=") == 2 * (1 + 2 * 3)
     text = html.unescape(re.sub("<[^>]*>", "", page))
-    for said in ("a & #1.csv", "Paint <wet>. CSV. a < b.", "12 %", "first pixel after 3.5 s"):
+    for said in ("a & #1.csv", "Paint <wet>. CSV. A < b.", "12 %", "first pixel after 3.5 s"):
         assert said in text, said
 
 
