@@ -59,6 +59,33 @@ function modelSource(slot, k, needed, functions, tables) {
   return out;
 }
 
+/**
+ * A model of BRDFC.models for measured data, which has no parameters: `name` is its key, in GLSL, too. The data are in
+ * the tables NAME_values and NAME_rows.
+ */
+function measuredModel(name, label, file, data) {
+  const wi = "vec3(wi_x, wi_y, wi_z)", wo = "vec3(wo_x, wo_y, wo_z)";
+  const pair = "float wi_x, float wi_y, float wi_z, float wo_x, float wo_y, float wo_z";
+  const values = `table_${name}_values`, rows = `table_${name}_rows`;
+  const tables = [`${name}_values`, `${name}_rows`];
+  const functions = {
+    [`${name}_eval`]: { tables, text: `vec3 ${name}_eval(${pair}) { return ${data.eval}(${values}, ${wi}, ${wo}); }\n` },
+    [`${name}_pdf`]: { tables, text: `float ${name}_pdf(${pair}) { return measured_pdf(${rows}, ${wi}, ${wo}); }\n` },
+    [`${name}_sample`]: {
+      tables,
+      text:
+        `void ${name}_sample(float wo_x, float wo_y, float wo_z, float u_x, float u_y, float u_z, out float wi_x, ` +
+        "out float wi_y, out float wi_z, out vec3 weight, out float pdf)\n{\n" +
+        `    vec3 wi = measured_sample(${rows}, ${wo}, vec3(u_x, u_y, u_z));\n` +
+        "    wi_x = wi.x;\n    wi_y = wi.y;\n    wi_z = wi.z;\n" +
+        `    pdf = measured_pdf(${rows}, wi, ${wo});\n` +
+        `    weight = pdf > 0.0 ? ${data.eval}(${values}, wi, ${wo}) * wi.z / pdf : vec3(0.0);\n}\n`,
+    },
+  };
+  const formulas = { eval: `${name}_eval`, pdf: `${name}_pdf`, sample: `${name}_sample`, through: false };
+  return { label, look: "measured", file, doc: [data.about, ...data.notes].join(" "), parameters: [], formulas: { "": formulas }, functions };
+}
+
 class Renderer {
   /** Throws an Error that says what the browser lacks. */
   constructor() {
@@ -102,6 +129,7 @@ class Renderer {
     const text = [
       "#version 300 es\nprecision highp float;\nprecision highp int;\nprecision highp sampler2D;",
       BRDFC.glsl.library,
+      ...(slots.some((s) => BRDFC.models[s.model].file) ? [BRDFC.glsl.measured] : []),
       ...[...tables].map((t) => `uniform sampler2D table_${t};`),
       ...functions.values(),
       ...wrappers,
@@ -131,7 +159,7 @@ class Renderer {
     const { gl } = this;
     const texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    const layout = format === gl.R32F ? gl.RED : gl.RGBA;
+    const layout = { [gl.R32F]: gl.RED, [gl.RGB32F]: gl.RGB }[format] || gl.RGBA;
     gl.texImage2D(gl.TEXTURE_2D, 0, format, width, height, 0, layout, gl.FLOAT, data);
     for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
     return texture;
@@ -147,6 +175,15 @@ class Renderer {
       this.tables.set(name, this.texture(TABLE_COLUMNS, rows, this.gl.R32F, padded));
     }
     return this.tables.get(name);
+  }
+
+  /** Adds measured data, as readMeasured() returns them, as the tables that measuredModel() names. */
+  addMeasured(name, { values, rows }) {
+    const { gl } = this;
+    while (gl.getError() !== gl.NO_ERROR);
+    this.tables.set(`${name}_values`, this.texture(values.width, values.height, gl.RGB32F, values.data));
+    this.tables.set(`${name}_rows`, this.texture(rows.length / 4, 1, gl.RGBA32F, rows));
+    if (gl.getError() !== gl.NO_ERROR) throw new Error("this device has no memory for it");
   }
 
   /** A float texture that can be drawn into; one of these for each key, made anew if its size changes. */
@@ -239,7 +276,8 @@ class Renderer {
   /** The albedo, four numbers an angle, for `count` angles evenly from 0 to nearly 90 degrees. */
   albedo(slot, count, azimuth) {
     const made = this.program("albedo", [slot], ["sample", "mirror", "transmit"]);
-    const target = this.target("albedo", count, 32);
+    // Data are not sampled as well as formulas.
+    const rows = BRDFC.models[slot.model].file ? 128 : 32, target = this.target(`albedo ${rows}`, count, rows);
     this.draw(made, target, [slot], { columns: count - 1, azimuth });
     return this.columns(target);
   }
