@@ -61,15 +61,16 @@ function modelSource(slot, k, needed, functions, tables) {
 
 /**
  * A model of BRDFC.models for measured data, which has no parameters: `name` is its key, in GLSL, too. The data are in
- * the tables NAME_values and NAME_rows.
+ * tables, as Renderer.addMeasured() makes them.
  */
 function measuredModel(name, label, file, data) {
   const wi = "vec3(wi_x, wi_y, wi_z)", wo = "vec3(wo_x, wo_y, wo_z)";
   const pair = "float wi_x, float wi_y, float wi_z, float wo_x, float wo_y, float wo_z";
-  const values = `table_${name}_values`, rows = `table_${name}_rows`;
-  const tables = [`${name}_values`, `${name}_rows`];
+  const rows = `table_${name}_rows`, tables = [...Object.keys(data.tables), "rows"].map((t) => `${name}_${t}`);
+  const given = [...Object.keys(data.tables).map((t) => `table_${name}_${t}`), ...data.constants].join(", ");
+  const value = (light) => `${data.glsl}_eval(${given}, ${light}, ${wo})`;
   const functions = {
-    [`${name}_eval`]: { tables, text: `vec3 ${name}_eval(${pair}) { return ${data.eval}(${values}, ${wi}, ${wo}); }\n` },
+    [`${name}_eval`]: { tables, text: `vec3 ${name}_eval(${pair}) { return ${value(wi)}; }\n` },
     [`${name}_pdf`]: { tables, text: `float ${name}_pdf(${pair}) { return measured_pdf(${rows}, ${wi}, ${wo}); }\n` },
     [`${name}_sample`]: {
       tables,
@@ -79,11 +80,12 @@ function measuredModel(name, label, file, data) {
         `    vec3 wi = measured_sample(${rows}, ${wo}, vec3(u_x, u_y, u_z));\n` +
         "    wi_x = wi.x;\n    wi_y = wi.y;\n    wi_z = wi.z;\n" +
         `    pdf = measured_pdf(${rows}, wi, ${wo});\n` +
-        `    weight = pdf > 0.0 ? ${data.eval}(${values}, wi, ${wo}) * wi.z / pdf : vec3(0.0);\n}\n`,
+        `    weight = pdf > 0.0 ? ${value("wi")} * wi.z / pdf : vec3(0.0);\n}\n`,
     },
   };
   const formulas = { eval: `${name}_eval`, pdf: `${name}_pdf`, sample: `${name}_sample`, through: false };
-  return { label, look: "measured", file, doc: [data.about, ...data.notes].join(" "), parameters: [], formulas: { "": formulas }, functions };
+  const doc = [data.about, ...data.notes.map((note) => `${note}.`)].join(" ");
+  return { label, look: "measured", file, doc, glsl: data.glsl, parameters: [], formulas: { "": formulas }, functions };
 }
 
 class Renderer {
@@ -129,7 +131,7 @@ class Renderer {
     const text = [
       "#version 300 es\nprecision highp float;\nprecision highp int;\nprecision highp sampler2D;",
       BRDFC.glsl.library,
-      ...(slots.some((s) => BRDFC.models[s.model].file) ? [BRDFC.glsl.measured] : []),
+      ...this.measuredGlsl(slots),
       ...[...tables].map((t) => `uniform sampler2D table_${t};`),
       ...functions.values(),
       ...wrappers,
@@ -155,6 +157,12 @@ class Renderer {
     return made;
   }
 
+  /** The GLSL that is written by hand for the measured data among models. */
+  measuredGlsl(slots) {
+    const names = slots.map((s) => BRDFC.models[s.model].glsl).filter(Boolean);
+    return names.length ? [BRDFC.glsl.measured, ...[...new Set(names)].map((n) => BRDFC.glsl[n])] : [];
+  }
+
   texture(width, height, format, data) {
     const { gl } = this;
     const texture = gl.createTexture();
@@ -177,13 +185,26 @@ class Renderer {
     return this.tables.get(name);
   }
 
-  /** Adds measured data, as readMeasured() returns them, as the tables that measuredModel() names. */
-  addMeasured(name, { values, rows }) {
+  /** Makes the tables of a measuredModel() that is in BRDFC.models. */
+  addMeasured(name, tables) {
     const { gl } = this;
+    const most = gl.getParameter(gl.MAX_TEXTURE_SIZE);
     while (gl.getError() !== gl.NO_ERROR);
-    this.tables.set(`${name}_values`, this.texture(values.width, values.height, gl.RGB32F, values.data));
-    this.tables.set(`${name}_rows`, this.texture(rows.length / 4, 1, gl.RGBA32F, rows));
-    if (gl.getError() !== gl.NO_ERROR) throw new Error("this device has no memory for it");
+    for (const [table, { width, height, channels, data }] of Object.entries(tables)) {
+      if (height > most) throw new Error("expected less data: they are too many for this device");
+      const format = { 1: gl.R32F, 3: gl.RGB32F, 4: gl.RGBA32F }[channels];
+      this.tables.set(`${name}_${table}`, this.texture(width, height, format, data));
+    }
+    if (gl.getError() !== gl.NO_ERROR) throw new Error("this device has no memory for the data");
+    // The data themselves tell how to sample them: any rows do to evaluate f.
+    const rows = (data) => {
+      const key = `${name}_rows`;
+      if (this.tables.has(key)) gl.deleteTexture(this.tables.get(key));
+      this.tables.set(key, this.texture(HALF_ROWS + 1, 1, gl.RGBA32F, data));
+    };
+    rows(new Float32Array(4 * HALF_ROWS + 4));
+    const pairs = halfVectorPairs();
+    rows(halfVectorRows(pairs, this.evaluate({ model: name, values: {} }, pairs.lights, pairs.views)));
   }
 
   /** A float texture that can be drawn into; one of these for each key, made anew if its size changes. */

@@ -675,12 +675,13 @@ async function modelOfFile(file) {
     const data = await readMeasured(file), name = `file${files.size + 1}`;
     const namesakes = Object.values(BRDFC.models).filter((m) => m.file === file.name).length;
     const label = namesakes ? `${file.name}, ${namesakes + 1}` : file.name;
+    BRDFC.models[name] = measuredModel(name, label, file.name, data);
     try {
-      renderer.addMeasured(name, data);
+      renderer.addMeasured(name, data.tables);
     } catch (error) {
+      delete BRDFC.models[name];
       throw new Error(`${file.name}: ${error.message}.`);
     }
-    BRDFC.models[name] = measuredModel(name, label, file.name, data);
     files.set(known, name);
   }
   return files.get(known);

@@ -194,7 +194,7 @@ BAD = {
     "holes.binary": "expected values above the horizon, found none.",
     "black.binary": "expected a number above 0, found none: the data are black.",
     "picture.png": "expected a file whose name ends with .binary",
-    "panel.xml": "The program reads this format: brdfc measured panel.xml",
+    "panel.xml": "the program reads this one: brdfc measured panel.xml",
     "folder.binary": "expected a file that can be read; this one can't.",
 }
 
