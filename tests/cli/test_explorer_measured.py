@@ -11,7 +11,8 @@ import subprocess
 import numpy as np
 import pytest
 from browser import Browser
-from measured_formats import MERL, merl, merl_directions, unit
+from measured_formats import MERL, direction, merl, merl_directions
+from measured_formats import unit as unit_vectors
 from support import BROWSERS, CHROMIUM, TOOL
 
 pytestmark = pytest.mark.slow
@@ -25,7 +26,7 @@ HEADER = struct.pack("<3i", *MERL)
 def shiny():
     """A lobe over a matte base, with noise; entries and whole rows that were not measured."""
     wi, wo = merl_directions()
-    lobe = np.clip(unit(wi + wo)[:, 2:], 0, 1) ** 40
+    lobe = np.clip(unit_vectors(wi + wo)[:, 2:], 0, 1) ** 40
     f = np.array([0.1, 0.05, 0.02]) + lobe * np.array([0.5, 0.6, 0.7])
     random = np.random.default_rng(5)
     f *= random.normal(1, 0.02, f.shape)
@@ -36,6 +37,22 @@ def shiny():
     f[random.random(f.shape) < 0.001] = -1e-4
     f[(wi[:, 2] < 0).reshape(MERL) | (wo[:, 2] < 0).reshape(MERL)] = -1
     return f.reshape(-1, 3)
+
+
+def table(theta_i, phi_i, theta_o, phi_o, unit=""):
+    """A table of text over a grid of degrees, of a lobe that is not reciprocal."""
+    grid = np.stack(np.meshgrid(theta_i, phi_i, theta_o, phi_o, indexing="ij"), -1).reshape(-1, 4)
+    radians = np.radians(grid)
+    wi, wo = direction(*radians[:, :2].T), direction(*radians[:, 2:].T)
+    h = unit_vectors(wi + wo)
+    lobe = np.exp(-6 * h[:, 0] ** 2 - 2 * h[:, 1] ** 2) * (1 + 0.3 * wi[:, 2])
+    if len(np.atleast_1d(phi_i)) == 1:
+        lobe = np.exp(-9 * (1 - h[:, 2]))
+    f = 0.05 + lobe[:, None] * np.array([0.2, 0.15, 0.1])
+    names = [name + unit for name in ("theta_i", "phi_i", "theta_o", "phi_o")]
+    rows = np.hstack([radians if unit == "_rad" else grid, f]).tolist()
+    text = "\r\n".join(",".join(f"{x:.9g}" for x in row) for row in rows)
+    return (",".join([*names, "r", "g", "B"]) + "\r\n\r\n" + text).encode()
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +70,20 @@ def files(tmp_path_factory):
         "nan.binary": merl(np.where(np.arange(np.prod(MERL))[:, None] == 7, np.nan, [1, 1, 1])),
         "holes.binary": merl(np.full((np.prod(MERL), 3), -1)),
         "black.binary": merl(np.zeros((np.prod(MERL), 3))),
+        "isotropic.csv": table(range(0, 90, 5), 0, range(0, 86, 5), range(0, 181, 10)),
+        "circle.csv": table([10, 30, 60, 80], 0, [0, 20, 50, 70], range(0, 360, 30)),
+        "anisotropic.csv": table(
+            range(0, 81, 20), range(0, 360, 30), range(0, 91, 15), range(15, 360, 30), "_rad"
+        ),
+        "gap.csv": table([0, 40], 0, [0, 40], [0, 90, 180]).rsplit(b"\r\n", 1)[0],
+        "empty.csv": b"",
+        "text.csv": b"theta_i,phi_i,theta_o,phi_o,r,g,b\n0,0,0,0,1,1,red\n",
+        "angle.csv": b"theta_i,phi_i,theta_o,phi_o,r,g,b\n95,0,0,0,1,1,1\n",
+        "columns.csv": b"theta_i,phi_i,theta_o,r,g,b\n95,0,0,0,1,1,1\n",
+        "twice.csv": b"theta_i,phi_i,theta_o,phi_o,r,g,b\n9,0,9,0,1,1,1\n9,0,9,360,1,1,2\n",
+        "radians.csv": table([0, 0.5, 1], 0, [0, 0.5, 1], [0, 1, 2, 3]),
+        "semicolons.csv": b"theta_i;phi_i;theta_o;phi_o;r;g;b\n10;0;10;0;1;1;1\n",
+        "dark.csv": b"theta_i,phi_i,theta_o,phi_o,r,g,b\n10,0,10,0,0,0,0\n",
         "picture.png": b"\x89PNG\r\n\x1a\n",
         "panel.xml": b"<WindowElement/>",
     }
@@ -115,7 +146,8 @@ def directions():
             angles = np.radians([[min(theta, 89.5), phi + 10], [view, 10]])
             s, c = np.sin(angles), np.cos(angles)
             pairs.append(np.stack([s[:, 0] * c[:, 1], s[:, 0] * s[:, 1], c[:, 0]], -1))
-    return np.float32(pairs)
+    # A direction along the normal, as that of atan2(0, -0), would have the azimuth 180.
+    return np.float32(pairs) + np.float32(0)
 
 
 def of_the_tool(file, pairs):
@@ -140,15 +172,17 @@ def albedo_of_the_tool(file, degrees):
     return [view["rgb"] for view in json.loads(done.stdout)["albedo"]]
 
 
-@pytest.mark.parametrize("name", ["shiny.binary"])
+@pytest.mark.parametrize("name", ["shiny.binary", "isotropic.csv", "circle.csv", "anisotropic.csv"])
 def test_values_and_albedos_are_those_of_the_tool(browser, files, name):
     dropped(browser, files / name)
     pairs = directions()
     truth, found = of_the_tool(files / name, pairs), of_the_page(browser, pairs)
     assert np.abs(found[:, :3] - truth).max() < TOLERANCE * truth.max()
     assert (found[:, 3] > 0).all()
-    got = browser.run("Array.from(renderer.albedo(state.slots[0], 46, 0))")
-    got = np.array(got).reshape(-1, 4)[[0, 15, 30, 40], :3]
+    # The tool's are means over eight azimuths.
+    azimuths = (np.arange(8) * np.pi / 4).tolist() if name == "anisotropic.csv" else [0]
+    got = browser.run(f"{azimuths}.map((a) => Array.from(renderer.albedo(state.slots[0], 46, a)))")
+    got = np.reshape(got, (len(azimuths), -1, 4)).mean(0)[[0, 15, 30, 40], :3]
     assert got == pytest.approx(np.array(albedo_of_the_tool(files / name, "0,30,60,80")), abs=0.01)
 
 
@@ -193,7 +227,19 @@ BAD = {
     "nan.binary": "red: found NaN at entry 7: expected finite numbers.",
     "holes.binary": "expected values above the horizon, found none.",
     "black.binary": "expected a number above 0, found none: the data are black.",
-    "picture.png": "expected a file whose name ends with .binary",
+    "gap.csv": "expected a row for every combination of angles: 2 theta_i, 1 phi_i, 2 theta_o, "
+    "3 phi_o, found 7 rows; none of theta_i 40, phi_i 0, theta_o 40, phi_o 180.",
+    "empty.csv": "expected a header with the columns theta_i,phi_i,theta_o,phi_o,r,g,b.",
+    "text.csv": "line 2: b: expected a finite number, got 'red'.",
+    "angle.csv": "line 2: theta_i: expected degrees from 0 to 90, got 95.",
+    "columns.csv": "expected a header with the columns theta_i,phi_i,theta_o,phi_o,r,g,b; phi_o is "
+    "missing.",
+    "twice.csv": "line 3: expected each combination of angles once, or the same values: theta_i 9, "
+    "phi_i 0, theta_o 9, phi_o 0 is in line 2, too.",
+    "radians.csv": "expected degrees, and all are small",
+    "semicolons.csv": "expected fields separated by commas, got semicolons.",
+    "dark.csv": "expected a number above 0, found none: the data are black.",
+    "picture.png": "expected a file whose name ends with .binary or .csv.",
     "panel.xml": "the program reads this one: brdfc measured panel.xml",
     "folder.binary": "expected a file that can be read; this one can't.",
 }

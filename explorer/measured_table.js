@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Reads tables of text, a row for every combination of four angles, as generator/measured/csv_grid.cpp and
+// angle_rows.cpp.
+"use strict";
+
+const ANGLES = ["theta_i", "phi_i", "theta_o", "phi_o"];
+/** Angles are told apart in these steps, of degrees. */
+const STEPS = 1e4;
+/** Rows of a direction along the normal may differ by this share without a note. */
+const ALIKE = 1e-3;
+
+/** The fields of a line, which commas separate, without the quotes around them. */
+const fieldsOf = (line) => line.split(",").map((field) => field.trim().replace(/^"(.*)"$/, "$1").trim());
+
+/** Radians of a few digits in degrees: whole degrees stay whole. */
+function degreesOf(radians) {
+  const degrees = (radians * 180) / Math.PI, whole = Math.round(degrees);
+  return Math.abs(degrees - whole) < 50 / STEPS ? whole : degrees;
+}
+
+/** The columns of a table by its header: {at: the places of four angles and r, g, b; radians; others}. */
+function columnsOf(header) {
+  const names = fieldsOf(header.replace(/^\uFEFF/, "")).map((name) => name.toLowerCase());
+  for (const [separator, title] of [[";", "semicolons"], ["\t", "tabs"]])
+    if (names.length === 1 && header.includes(separator)) throw new Error(`line 1: expected fields separated by commas, got ${title}`);
+  if (names.includes("wi_x"))
+    throw new Error("expected angles, theta_i,phi_i,theta_o,phi_o,r,g,b: the page does not read unit vectors, brdfc measured does");
+  const unit = ["_deg", "_rad"].find((u) => names.includes(`theta_i${u}`)) || "";
+  const expected = [...ANGLES.map((name) => name + unit), "r", "g", "b"];
+  const at = expected.map((name) => names.indexOf(name));
+  if (at.includes(-1))
+    throw new Error(`expected a header with the columns ${expected.join(",")}; ${expected[at.indexOf(-1)]} is missing`);
+  const twice = expected.find((name) => names.indexOf(name) !== names.lastIndexOf(name));
+  if (twice) throw new Error(`expected one column ${twice}, found several`);
+  const others = names.filter((name) => !expected.includes(name));
+  return { names, at, expected, radians: unit === "_rad", plain: unit === "", others };
+}
+
+/** The rows of a table: {steps: four angles, value, line}, and how many numbers are negative. */
+function rowsOf(text) {
+  const lines = text.split("\n"), first = lines.findIndex((line) => line.trim());
+  if (first < 0) throw new Error(`expected a header with the columns ${ANGLES.join(",")},r,g,b`);
+  const columns = columnsOf(lines[first]), rows = [];
+  let negative = 0;
+  for (let i = first + 1; i < lines.length; ++i) {
+    if (!lines[i].trim()) continue;
+    const fields = fieldsOf(lines[i]), where = `line ${i + 1}`;
+    if (fields.length !== columns.names.length)
+      throw new Error(`${where}: expected ${columns.names.length} values as in the header, got ${fields.length}`);
+    const [a, b, c, d, ...value] = columns.at.map((at, k) => {
+      const number = /^[\d.e+-]+$/i.test(fields[at]) ? Number(fields[at]) : NaN;
+      if (!Number.isFinite(Math.fround(number)))
+        throw new Error(`${where}: ${columns.expected[k]}: expected a finite number, got '${fields[at].slice(0, 40)}'`);
+      return number;
+    });
+    const angles = [a, b, c, d].map((x) => (columns.radians ? degreesOf(x) : x));
+    for (const k of [0, 2])
+      if (!(angles[k] >= 0 && angles[k] <= 90))
+        throw new Error(`${where}: ${columns.expected[k]}: expected ${columns.radians ? "radians from 0 to pi/2" : "degrees from 0 to 90"}, got ${[a, b, c, d][k]}`);
+    for (const k of [1, 3])
+      if (!(Math.abs(angles[k]) <= 1e6)) throw new Error(`${where}: ${columns.expected[k]}: expected an azimuth, got ${[a, b, c, d][k]}`);
+    const steps = angles.map((x, k) => {
+      const step = Math.round((k % 2 ? x - 360 * Math.floor(x / 360) : x) * STEPS);
+      return k % 2 && step === 360 * STEPS ? 0 : step;
+    });
+    negative += value.filter((x) => x < 0).length;
+    rows.push({ steps, value: value.map((x) => Math.fround(Math.max(x, 0))), line: i + 1 });
+  }
+  if (!rows.length) throw new Error("expected rows below the header, found none");
+  return { rows, negative, columns };
+}
+
+/** The mean of rows by place, where azimuths of directions along the normal are 0, and by how much rows differ. */
+function placesOf(rows) {
+  const places = new Map(), lines = new Map();
+  for (const { steps, value, line } of rows) {
+    const key = String(steps), before = lines.get(key);
+    if (before) {
+      if (String(before.value) === String(value)) continue;
+      const angles = ANGLES.map((name, k) => `${name} ${steps[k] / STEPS}`).join(", ");
+      throw new Error(`line ${line}: expected each combination of angles once, or the same values: ${angles} is in line ${before.line}, too`);
+    }
+    lines.set(key, { value, line });
+    const at = [...steps];
+    for (const k of [1, 3]) if (at[k - 1] === 0) at[k] = 0;
+    const place = places.get(String(at));
+    if (place) place.push(value);
+    else places.set(String(at), [value]);
+  }
+  let spread = 0;
+  for (const [key, values] of places) {
+    const mean = [0, 1, 2].map((c) => values.reduce((sum, v) => sum + v[c], 0) / values.length);
+    for (let c = 0; c < 3; ++c) {
+      const all = values.map((v) => v[c]);
+      if (mean[c] > 0) spread = Math.max(spread, (Math.max(...all) - Math.min(...all)) / mean[c]);
+    }
+    places.set(key, mean);
+  }
+  return { places, spread };
+}
+
+/** Whether angles that are taken for degrees are likely to be radians. */
+function looksLikeRadians(axes) {
+  const thetas = new Set([...axes[0], ...axes[2]].filter((x) => x > 0));
+  return thetas.size > 1 && axes.every((axis, k) => axis.at(-1) <= (k % 2 ? 2 : 0.5) * Math.PI + 1e-3);
+}
+
+async function readTable(file) {
+  const { rows, negative, columns } = rowsOf(await file.text());
+  const { places, spread } = placesOf(rows);
+  // An azimuth counts where it matters: not along the normal.
+  const axes = ANGLES.map((_, k) => {
+    const steps = rows.map((row) => row.steps).filter((s) => k % 2 === 0 || s[k - 1] !== 0).map((s) => s[k]);
+    return steps.length ? [...new Set(steps)].sort((a, b) => a - b) : [0];
+  });
+  const degrees = axes.map((axis) => axis.map((step) => step / STEPS));
+  if (columns.plain && looksLikeRadians(degrees))
+    throw new Error("theta_i, theta_o: expected degrees, and all are small: name the columns theta_i_rad and so on for radians, theta_i_deg for such small degrees");
+  const sizes = axes.map((axis) => axis.length), entries = sizes.reduce((a, b) => a * b);
+  const found = `${ANGLES.map((name, k) => `${sizes[k]} ${name}`).join(", ")}, found ${counted(places.size, "row", "rows")}`;
+  if (entries > 4 * places.size) throw new Error(`expected a row for every combination of angles: ${found}`);
+  const values = new Float32Array(3 * entries);
+  let largest = 0, at = 0;
+  for (const a of axes[0])
+    for (const b of axes[1])
+      for (const c of axes[2])
+        for (const d of axes[3]) {
+          const value = places.get(`${a},${a ? b : 0},${c},${c ? d : 0}`);
+          if (!value) {
+            const missing = [a, b, c, d].map((step, k) => `${ANGLES[k]} ${step / STEPS}`).join(", ");
+            throw new Error(`expected a row for every combination of angles: ${found}; none of ${missing}`);
+          }
+          largest = Math.max(largest, ...value);
+          values.set(value, at);
+          at += 3;
+        }
+  if (!(largest > 0)) throw new Error("expected a number above 0, found none: the data are black");
+  const isotropic = sizes[1] === 1;
+  if (isotropic && axes[1][0] !== 0) throw new Error(`phi_i: expected 0 where it has one value, got ${degrees[1][0]}`);
+  const mirrored = isotropic && degrees[3].at(-1) <= 180;
+  const notes = [], highest = Math.min(degrees[0].at(-1), degrees[2].at(-1));
+  if (columns.others.length) notes.push(`Not known and not read: ${columns.others.join(", ")}`);
+  if (negative) notes.push(`${counted(negative, "number is", "numbers are")} negative: taken for 0`);
+  if (spread > ALIKE) notes.push(`Rows of one direction along the normal differ by up to ${percentOf(spread)} %: their mean is taken`);
+  if (mirrored) notes.push("phi_o lies within half a circle: the other half is taken for its mirror image");
+  if (highest < 89) notes.push(`Nothing was measured beyond ${highest} degrees to the normal: what is there holds beyond`);
+  const width = Math.max(...sizes), padded = degrees.flatMap((axis) => [...axis, ...Array(width - axis.length).fill(0)]);
+  return {
+    about:
+      `Measured, a table: ${isotropic ? "isotropic" : "anisotropic"}, ${sizes[0]} x ${sizes[1]} directions of light, ` +
+      `${sizes[2]} x ${sizes[3]} of view, linear in between.`,
+    notes,
+    glsl: "measured_table",
+    tables: { values: textureOf(values, 3), axes: textureOf(padded, 1, width) },
+    constants: [`ivec4(${sizes.join(", ")})`, String(mirrored)],
+  };
+}
