@@ -7,9 +7,9 @@
 "use strict";
 
 /** How the names of files end that can be read. */
-const MEASURED_READERS = { ".binary": readMerl, ".csv": readTable };
+const MEASURED_READERS = { ".binary": readMerl, ".bsdf": readRgl, ".csv": readTable };
 /** Those that brdfc reads, too. */
-const OTHER_FORMATS = [".bsdf", ".bin", ".alta", ".dat", ".xml"];
+const OTHER_FORMATS = [".bin", ".alta", ".dat", ".xml"];
 const COLUMNS_OF_NUMBERS = 1024;
 
 /** Rows of half vectors, and of the pairs of directions that are tried for each: of views about it, and of azimuths. */
@@ -103,10 +103,10 @@ function halfVectorRows({ lights, views }, values) {
 async function readMeasured(file) {
   const ending = /\.[^.]*$/.exec(file.name.toLowerCase())?.[0];
   const reader = Object.hasOwn(MEASURED_READERS, ending) ? MEASURED_READERS[ending] : undefined;
-  const known = Object.keys(MEASURED_READERS).join(" or ");
+  const known = Object.keys(MEASURED_READERS).join(", ");
   if (!reader)
     throw new Error(
-      `${file.name}: expected a file whose name ends with ${known}` +
+      `${file.name}: expected a file whose name ends with one of ${known}` +
         (OTHER_FORMATS.includes(ending) ? `; the program reads this one: brdfc measured ${file.name}` : "."),
     );
   try {

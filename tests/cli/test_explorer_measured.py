@@ -11,7 +11,8 @@ import subprocess
 import numpy as np
 import pytest
 from browser import Browser
-from measured_formats import MERL, direction, merl, merl_directions
+from measured_files import rgl_fields
+from measured_formats import MERL, direction, merl, merl_directions, tensor
 from measured_formats import unit as unit_vectors
 from support import BROWSERS, CHROMIUM, TOOL
 
@@ -84,6 +85,15 @@ def files(tmp_path_factory):
         "radians.csv": table([0, 0.5, 1], 0, [0, 0.5, 1], [0, 1, 2, 3]),
         "semicolons.csv": b"theta_i;phi_i;theta_o;phi_o;r;g;b\n10;0;10;0;1;1;1\n",
         "dark.csv": b"theta_i,phi_i,theta_o,phi_o,r,g,b\n10,0,10,0,0,0,0\n",
+        "isotropic.bsdf": tensor(rgl_fields("isotropic")),
+        "anisotropic.bsdf": tensor(rgl_fields("anisotropic")),
+        "quarter.bsdf": tensor(rgl_fields("quarter")),
+        "spectral.bsdf": tensor(rgl_fields("spectral")),
+        "not.bsdf": bytes(1000),
+        "short.bsdf": tensor(rgl_fields("isotropic"))[:-1],
+        "head.bsdf": tensor(rgl_fields("isotropic"))[:40],
+        "empty.bsdf": b"",
+        "fields.bsdf": tensor({k: a for k, a in rgl_fields("isotropic").items() if k != "vndf"}),
         "picture.png": b"\x89PNG\r\n\x1a\n",
         "panel.xml": b"<WindowElement/>",
     }
@@ -136,14 +146,14 @@ def said(browser, *files):
     return browser.run("byId('error').textContent").splitlines()
 
 
-def directions():
+def directions(turn=0):
     """Pairs of unit vectors in single precision: on a grid, and about the mirror direction."""
     pairs = []
     for view in (0, 20, 45, 70, 86):
         grid = [(t, p) for t in range(0, 90, 6) for p in range(0, 360, 25)]
         about = [(abs(view + d), 180 + a) for d in (-5, -1, -0.3, 0, 0.5, 3) for a in (0, 1, 7)]
         for theta, phi in [*grid, *about]:
-            angles = np.radians([[min(theta, 89.5), phi + 10], [view, 10]])
+            angles = np.radians([[min(theta, 89.5), phi + 10 + turn], [view, 10]])
             s, c = np.sin(angles), np.cos(angles)
             pairs.append(np.stack([s[:, 0] * c[:, 1], s[:, 0] * s[:, 1], c[:, 0]], -1))
     # A direction along the normal, as that of atan2(0, -0), would have the azimuth 180.
@@ -172,18 +182,30 @@ def albedo_of_the_tool(file, degrees):
     return [view["rgb"] for view in json.loads(done.stdout)["albedo"]]
 
 
-@pytest.mark.parametrize("name", ["shiny.binary", "isotropic.csv", "circle.csv", "anisotropic.csv"])
+FILES = (
+    "shiny.binary",
+    "isotropic.csv",
+    "circle.csv",
+    "anisotropic.csv",
+    "isotropic.bsdf",
+    "anisotropic.bsdf",
+    "quarter.bsdf",
+)
+
+
+@pytest.mark.parametrize("name", FILES)
 def test_values_and_albedos_are_those_of_the_tool(browser, files, name):
     dropped(browser, files / name)
-    pairs = directions()
+    # Slices of these files have ends that differ, where the light is in the plane of the view.
+    pairs = directions(0.1 if name.endswith(".bsdf") else 0)
     truth, found = of_the_tool(files / name, pairs), of_the_page(browser, pairs)
     assert np.abs(found[:, :3] - truth).max() < TOLERANCE * truth.max()
     assert (found[:, 3] > 0).all()
     # The tool's are means over eight azimuths.
-    azimuths = (np.arange(8) * np.pi / 4).tolist() if name == "anisotropic.csv" else [0]
+    azimuths = (np.arange(8) * np.pi / 4).tolist() if name[0] in "aq" else [0]
     got = browser.run(f"{azimuths}.map((a) => Array.from(renderer.albedo(state.slots[0], 46, a)))")
-    got = np.reshape(got, (len(azimuths), -1, 4)).mean(0)[[0, 15, 30, 40], :3]
-    assert got == pytest.approx(np.array(albedo_of_the_tool(files / name, "0,30,60,80")), abs=0.01)
+    got = np.reshape(got, (len(azimuths), -1, 4)).mean(0)[[1, 15, 30, 40], :3]
+    assert got == pytest.approx(np.array(albedo_of_the_tool(files / name, "2,30,60,80")), abs=0.01)
 
 
 def test_what_was_not_measured_is_said_as_by_the_tool(browser, files):
@@ -239,7 +261,13 @@ BAD = {
     "radians.csv": "expected degrees, and all are small",
     "semicolons.csv": "expected fields separated by commas, got semicolons.",
     "dark.csv": "expected a number above 0, found none: the data are black.",
-    "picture.png": "expected a file whose name ends with .binary or .csv.",
+    "spectral.bsdf": "rgb: expected colours: the page does not read spectra",
+    "not.bsdf": 'expected a tensor file, which starts with "tensor_file".',
+    "short.bsdf": "expected its data inside the file, which has",
+    "head.bsdf": "truncated?",
+    "empty.bsdf": "expected a tensor file",
+    "fields.bsdf": "vndf: expected this field, found none of the name.",
+    "picture.png": "expected a file whose name ends with one of .binary, .bsdf, .csv.",
     "panel.xml": "the program reads this one: brdfc measured panel.xml",
     "folder.binary": "expected a file that can be read; this one can't.",
 }
