@@ -7,9 +7,9 @@
 "use strict";
 
 /** How the names of files end that can be read. */
-const MEASURED_READERS = { ".binary": readMerl, ".bsdf": readRgl, ".csv": readTable };
+const MEASURED_READERS = { ".binary": readMerl, ".bsdf": readRgl, ".bin": readUtia, ".csv": readTable };
 /** Those that brdfc reads, too. */
-const OTHER_FORMATS = [".bin", ".alta", ".dat", ".xml"];
+const OTHER_FORMATS = [".alta", ".dat", ".xml"];
 const COLUMNS_OF_NUMBERS = 1024;
 
 /** Rows of half vectors, and of the pairs of directions that are tried for each: of views about it, and of azimuths. */

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads tables of text, a row for every combination of four angles, as generator/measured/csv_grid.cpp and
-// angle_rows.cpp.
+// Reads grids over the angles of light and view: tables of text, a row for every combination, as csv_grid.cpp and
+// angle_rows.cpp of generator/measured; and UTIA's files, as utia.cpp.
 "use strict";
 
 const ANGLES = ["theta_i", "phi_i", "theta_o", "phi_o"];
@@ -105,6 +105,44 @@ function looksLikeRadians(axes) {
   return thetas.size > 1 && axes.every((axis, k) => axis.at(-1) <= (k % 2 ? 2 : 0.5) * Math.PI + 1e-3);
 }
 
+/** What a reader returns for values on four axes in degrees, of which the last runs fastest. */
+function gridOf(format, degrees, values, mirrored, notes) {
+  const sizes = degrees.map((axis) => axis.length), width = Math.max(...sizes);
+  const padded = degrees.flatMap((axis) => [...axis, ...Array(width - axis.length).fill(0)]);
+  if (!values.some((x) => x > 0)) throw new Error("expected a number above 0, found none: the data are black");
+  const highest = Math.min(degrees[0].at(-1), degrees[2].at(-1));
+  if (highest < 89) notes.push(`Nothing was measured beyond ${highest} degrees to the normal: what is there holds beyond`);
+  return {
+    about:
+      `Measured, ${format}: ${sizes[1] === 1 ? "isotropic" : "anisotropic"}, ${sizes[0]} x ${sizes[1]} directions of ` +
+      `light, ${sizes[2]} x ${sizes[3]} of view, linear in between.`,
+    notes,
+    glsl: "measured_table",
+    tables: { values: textureOf(values, 3), axes: textureOf(padded, 1, width) },
+    constants: [`ivec4(${sizes.join(", ")})`, String(mirrored)],
+  };
+}
+
+async function readUtia(file) {
+  const thetas = Array.from({ length: 6 }, (_, i) => 15 * i), phis = Array.from({ length: 48 }, (_, i) => 7.5 * i);
+  const directions = thetas.length * phis.length, entries = directions ** 2, bytes = 3 * 8 * entries;
+  if (file.size !== bytes) {
+    const doubt = file.size === bytes / 2 ? ": are these numbers in single precision?" : file.size < bytes ? ": truncated?" : "";
+    throw new Error(`expected ${bytes} bytes, 3 planes of ${directions} x ${directions} doubles, as UTIA's files have, got ${file.size}${doubt}`);
+  }
+  const numbers = new Float64Array(await file.arrayBuffer()), values = new Float32Array(3 * entries);
+  let negative = 0;
+  numbers.forEach((x, i) => {
+    const entry = i % entries, c = Math.floor(i / entries);
+    if (!Number.isFinite(Math.fround(x)))
+      throw new Error(`${["red", "green", "blue"][c]}: found ${x} in row ${Math.floor(entry / directions)}, column ${entry % directions}: expected finite numbers in little-endian byte order`);
+    negative += x < 0;
+    values[3 * entry + c] = Math.max(x, 0);
+  });
+  const notes = negative ? [`${counted(negative, "number is", "numbers are")} negative, ${percentOf(negative / numbers.length)} %: taken for 0`] : [];
+  return gridOf("in UTIA's format", [thetas, phis, thetas, phis], values, false, notes);
+}
+
 async function readTable(file) {
   const { rows, negative, columns } = rowsOf(await file.text());
   const { places, spread } = placesOf(rows);
@@ -120,7 +158,7 @@ async function readTable(file) {
   const found = `${ANGLES.map((name, k) => `${sizes[k]} ${name}`).join(", ")}, found ${counted(places.size, "row", "rows")}`;
   if (entries > 4 * places.size) throw new Error(`expected a row for every combination of angles: ${found}`);
   const values = new Float32Array(3 * entries);
-  let largest = 0, at = 0;
+  let at = 0;
   for (const a of axes[0])
     for (const b of axes[1])
       for (const c of axes[2])
@@ -130,28 +168,16 @@ async function readTable(file) {
             const missing = [a, b, c, d].map((step, k) => `${ANGLES[k]} ${step / STEPS}`).join(", ");
             throw new Error(`expected a row for every combination of angles: ${found}; none of ${missing}`);
           }
-          largest = Math.max(largest, ...value);
           values.set(value, at);
           at += 3;
         }
-  if (!(largest > 0)) throw new Error("expected a number above 0, found none: the data are black");
   const isotropic = sizes[1] === 1;
   if (isotropic && axes[1][0] !== 0) throw new Error(`phi_i: expected 0 where it has one value, got ${degrees[1][0]}`);
   const mirrored = isotropic && degrees[3].at(-1) <= 180;
-  const notes = [], highest = Math.min(degrees[0].at(-1), degrees[2].at(-1));
+  const notes = [];
   if (columns.others.length) notes.push(`Not known and not read: ${columns.others.join(", ")}`);
   if (negative) notes.push(`${counted(negative, "number is", "numbers are")} negative: taken for 0`);
   if (spread > ALIKE) notes.push(`Rows of one direction along the normal differ by up to ${percentOf(spread)} %: their mean is taken`);
   if (mirrored) notes.push("phi_o lies within half a circle: the other half is taken for its mirror image");
-  if (highest < 89) notes.push(`Nothing was measured beyond ${highest} degrees to the normal: what is there holds beyond`);
-  const width = Math.max(...sizes), padded = degrees.flatMap((axis) => [...axis, ...Array(width - axis.length).fill(0)]);
-  return {
-    about:
-      `Measured, a table: ${isotropic ? "isotropic" : "anisotropic"}, ${sizes[0]} x ${sizes[1]} directions of light, ` +
-      `${sizes[2]} x ${sizes[3]} of view, linear in between.`,
-    notes,
-    glsl: "measured_table",
-    tables: { values: textureOf(values, 3), axes: textureOf(padded, 1, width) },
-    constants: [`ivec4(${sizes.join(", ")})`, String(mirrored)],
-  };
+  return gridOf("a table", degrees, values, mirrored, notes);
 }

@@ -687,8 +687,15 @@ async function modelOfFile(file) {
   return files.get(known);
 }
 
+/** Files are read one after another, also those that are dropped while others are read. */
+let reading = Promise.resolve();
+function addFiles(list) {
+  reading = reading.then(() => showFiles(list)).catch(fail);
+  return reading;
+}
+
 /** Shows files as the first models: the difference is then divided by the light of the data. Says what is wrong. */
-async function addFiles(list) {
+async function showFiles(list) {
   if (!renderer) return;
   const wrong = [], shown = [];
   byId("status").textContent = `Reading ${list.map((f) => f.name).join(", ")}.`;

@@ -11,7 +11,7 @@ import subprocess
 import numpy as np
 import pytest
 from browser import Browser
-from measured_files import rgl_fields
+from measured_files import rgl_fields, utia, utia_directions
 from measured_formats import MERL, direction, merl, merl_directions, tensor
 from measured_formats import unit as unit_vectors
 from support import BROWSERS, CHROMIUM, TOOL
@@ -38,6 +38,13 @@ def shiny():
     f[random.random(f.shape) < 0.001] = -1e-4
     f[(wi[:, 2] < 0).reshape(MERL) | (wo[:, 2] < 0).reshape(MERL)] = -1
     return f.reshape(-1, 3)
+
+
+def brushed(wi, wo):
+    """Anisotropic, and not reciprocal; with a channel below 0."""
+    h = unit_vectors(wi + wo)
+    lobe = np.exp(-6 * h[:, 0] ** 2 - 2 * h[:, 1] ** 2) * (1 + 0.3 * wi[:, 0])
+    return 0.05 + lobe[:, None] * np.array([0.2, 0.15, -0.1])
 
 
 def table(theta_i, phi_i, theta_o, phi_o, unit=""):
@@ -85,6 +92,9 @@ def files(tmp_path_factory):
         "radians.csv": table([0, 0.5, 1], 0, [0, 0.5, 1], [0, 1, 2, 3]),
         "semicolons.csv": b"theta_i;phi_i;theta_o;phi_o;r;g;b\n10;0;10;0;1;1;1\n",
         "dark.csv": b"theta_i,phi_i,theta_o,phi_o,r,g,b\n10,0,10,0,0,0,0\n",
+        "utia.bin": utia(brushed(*utia_directions())),
+        "short.bin": bytes(1000),
+        "nan.bin": utia(np.full((288 * 288, 3), np.nan)),
         "isotropic.bsdf": tensor(rgl_fields("isotropic")),
         "anisotropic.bsdf": tensor(rgl_fields("anisotropic")),
         "quarter.bsdf": tensor(rgl_fields("quarter")),
@@ -190,6 +200,7 @@ FILES = (
     "isotropic.bsdf",
     "anisotropic.bsdf",
     "quarter.bsdf",
+    "utia.bin",
 )
 
 
@@ -202,7 +213,7 @@ def test_values_and_albedos_are_those_of_the_tool(browser, files, name):
     assert np.abs(found[:, :3] - truth).max() < TOLERANCE * truth.max()
     assert (found[:, 3] > 0).all()
     # The tool's are means over eight azimuths.
-    azimuths = (np.arange(8) * np.pi / 4).tolist() if name[0] in "aq" else [0]
+    azimuths = (np.arange(8) * np.pi / 4).tolist() if name[0] in "aqu" else [0]
     got = browser.run(f"{azimuths}.map((a) => Array.from(renderer.albedo(state.slots[0], 46, a)))")
     got = np.reshape(got, (len(azimuths), -1, 4)).mean(0)[[1, 15, 30, 40], :3]
     assert got == pytest.approx(np.array(albedo_of_the_tool(files / name, "2,30,60,80")), abs=0.01)
@@ -262,12 +273,15 @@ BAD = {
     "semicolons.csv": "expected fields separated by commas, got semicolons.",
     "dark.csv": "expected a number above 0, found none: the data are black.",
     "spectral.bsdf": "rgb: expected colours: the page does not read spectra",
+    "short.bin": "expected 1990656 bytes, 3 planes of 288 x 288 doubles, as UTIA's files have, got "
+    "1000: truncated?",
+    "nan.bin": "red: found NaN in row 0, column 0: expected finite numbers",
     "not.bsdf": 'expected a tensor file, which starts with "tensor_file".',
     "short.bsdf": "expected its data inside the file, which has",
     "head.bsdf": "truncated?",
     "empty.bsdf": "expected a tensor file",
     "fields.bsdf": "vndf: expected this field, found none of the name.",
-    "picture.png": "expected a file whose name ends with one of .binary, .bsdf, .csv.",
+    "picture.png": "expected a file whose name ends with one of .binary, .bsdf, .bin, .csv.",
     "panel.xml": "the program reads this one: brdfc measured panel.xml",
     "folder.binary": "expected a file that can be read; this one can't.",
 }
