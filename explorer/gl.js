@@ -187,6 +187,18 @@ class Renderer {
 
   /** Makes the tables of a measuredModel() that is in BRDFC.models. */
   addMeasured(name, tables) {
+    try {
+      this.fillMeasured(name, tables);
+    } catch (error) {
+      for (const table of [...Object.keys(tables), "rows"]) {
+        this.gl.deleteTexture(this.tables.get(`${name}_${table}`) || null);
+        this.tables.delete(`${name}_${table}`);
+      }
+      throw error;
+    }
+  }
+
+  fillMeasured(name, tables) {
     const { gl } = this;
     const most = gl.getParameter(gl.MAX_TEXTURE_SIZE);
     while (gl.getError() !== gl.NO_ERROR);
@@ -195,7 +207,7 @@ class Renderer {
       const format = { 1: gl.R32F, 3: gl.RGB32F, 4: gl.RGBA32F }[channels];
       this.tables.set(`${name}_${table}`, this.texture(width, height, format, data));
     }
-    if (gl.getError() !== gl.NO_ERROR) throw new Error("this device has no memory for the data");
+    if (gl.getError() !== gl.NO_ERROR) throw new Error("expected less data: this device has no memory for them");
     // The data themselves tell how to sample them: any rows do to evaluate f.
     const rows = (data) => {
       const key = `${name}_rows`;

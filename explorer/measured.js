@@ -107,7 +107,7 @@ async function readMeasured(file) {
   if (!reader)
     throw new Error(
       `${file.name}: expected a file whose name ends with one of ${known}` +
-        (OTHER_FORMATS.includes(ending) ? `; the program reads this one: brdfc measured ${file.name}` : "."),
+        (OTHER_FORMATS.includes(ending) ? "; brdfc measured reads this one, too." : "."),
     );
   try {
     return await reader(file);

@@ -106,7 +106,10 @@ const FIRST_LAMP = [-0.45, 0.5];
 /** The name of the measured file that a slot shows, if it shows one. */
 const fileOf = (slot) => BRDFC.models[slot.model].file;
 
-/** Everything that a link carries, and files, which it can't. `lamp` is a place on the picture, of which lampDirection() makes a direction. */
+/**
+ * Everything that a link carries, and files, which it can't. `lamp` is a place on the picture, of which lampDirection()
+ * makes a direction.
+ */
 const state = { slots: [], lamp: FIRST_LAMP };
 
 /** The direction to the lamp: in the picture's centre it is at the viewer, 100 degrees off where the sphere ends. */
@@ -665,14 +668,15 @@ function addModel() {
 
 // ---- Measured files -----------------------------------------------------------------------------
 
-/** Keys of BRDFC.models by what tells files apart. */
+/** Keys of BRDFC.models by what tells files apart, and how many keys there were. */
 const files = new Map();
+let fileKeys = 0;
 
 /** Reads a file and returns the key of its model, which the menus of models offer from then on. */
 async function modelOfFile(file) {
   const known = `${file.name} ${file.size} ${file.lastModified}`;
   if (!files.has(known)) {
-    const data = await readMeasured(file), name = `file${files.size + 1}`;
+    const data = await readMeasured(file), name = `file${++fileKeys}`;
     const namesakes = Object.values(BRDFC.models).filter((m) => m.file === file.name).length;
     const label = namesakes ? `${file.name}, ${namesakes + 1}` : file.name;
     BRDFC.models[name] = measuredModel(name, label, file.name, data);
@@ -697,21 +701,20 @@ function addFiles(list) {
 /** Shows files as the first models: the difference is then divided by the light of the data. Says what is wrong. */
 async function showFiles(list) {
   if (!renderer) return;
-  const wrong = [], shown = [];
+  const wrong = [], added = [];
   byId("status").textContent = `Reading ${list.map((f) => f.name).join(", ")}.`;
   for (const file of list) {
     try {
       const model = await modelOfFile(file);
-      if (state.slots.some((s) => s.model === model)) continue;
-      if (state.slots.length < MOST_MODELS) {
-        state.slots.unshift({ model, values: {} });
-        shown.unshift(BRDFC.models[model].label);
-      } else wrong.push(`${file.name}: ${MOST_MODELS} models are shown already; choose the file in the menu of one of them, to show it instead.`);
+      if (added.includes(model) || state.slots.some((s) => s.model === model)) continue;
+      if (state.slots.length + added.length < MOST_MODELS) added.push(model);
+      else wrong.push(`${file.name}: ${MOST_MODELS} models are shown already; choose the file in the menu of one of them, to show it instead.`);
     } catch (error) {
       wrong.push(error.message);
     }
   }
-  byId("status").textContent = shown.length ? `Shown first: ${shown.join(", ")}.` : "";
+  state.slots.unshift(...added.map((model) => ({ model, values: {} })));
+  byId("status").textContent = added.length ? `Shown first: ${added.map((m) => BRDFC.models[m].label).join(", ")}.` : "";
   rebuild();
   if (wrong.length) {
     fail(new Error(wrong.join("\n")));

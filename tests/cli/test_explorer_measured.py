@@ -282,7 +282,7 @@ BAD = {
     "empty.bsdf": "expected a tensor file",
     "fields.bsdf": "vndf: expected this field, found none of the name.",
     "picture.png": "expected a file whose name ends with one of .binary, .bsdf, .bin, .csv.",
-    "panel.xml": "the program reads this one: brdfc measured panel.xml",
+    "panel.xml": "; brdfc measured reads this one, too.",
     "folder.binary": "expected a file that can be read; this one can't.",
 }
 
@@ -332,6 +332,26 @@ def test_a_fifth_column_is_declined(browser, files):
     assert "choose the file in the menu of one of them" in sentence
     assert browser.run("state.slots.length") == 4
     assert browser.run("document.querySelectorAll('#slots option[value=file1]').length") == 4
+
+
+def test_files_stay_in_order_and_their_names_are_text(browser, files):
+    name = "<img src=x onerror=alert(1)>.csv"
+    (files / name).write_bytes((files / "isotropic.csv").read_bytes())
+    dropped(browser, files / name, files / "utia.bin")
+    shown = "[...document.querySelectorAll('#pictures figcaption')].map((e) => e.textContent)"
+    assert browser.run(shown) == [name, "utia.bin", "Microfacet", "Ward"]
+    assert browser.run("document.querySelectorAll('img').length") == 0
+    browser.wait_for("stale.size === 0")
+
+
+def test_a_device_without_memory_is_told(browser, files):
+    browser.run("""(() => {
+      let asked = 0;
+      renderer.gl.getError = () => (++asked === 2 ? renderer.gl.OUT_OF_MEMORY : 0);
+    })()""")
+    (sentence,) = said(browser, files / "isotropic.csv")
+    assert sentence.startswith("isotropic.csv: expected less data: this device has no memory")
+    assert browser.run("Object.keys(BRDFC.models).filter((m) => BRDFC.models[m].file)") == []
 
 
 def test_a_link_does_not_carry_a_file_and_says_so(browser, files):
