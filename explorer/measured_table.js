@@ -3,9 +3,9 @@
 // angle_rows.cpp of generator/measured; and UTIA's files, as utia.cpp.
 "use strict";
 
-const ANGLES = ["theta_i", "phi_i", "theta_o", "phi_o"];
-/** Angles are told apart in these steps, of degrees. */
-const STEPS = 1e4;
+const ANGLES = ["theta_i", "phi_i", "theta_o", "phi_o"], VECTORS = ["wi_x", "wi_y", "wi_z", "wo_x", "wo_y", "wo_z"];
+/** Angles are told apart in these steps, of degrees; those of unit vectors with six digits are the same within so many. */
+const STEPS = 1e4, ROUNDING = 100;
 /** Rows of a direction along the normal may differ by this share without a note. */
 const ALIKE = 1e-3;
 
@@ -18,22 +18,45 @@ function degreesOf(radians) {
   return Math.abs(degrees - whole) < 50 / STEPS ? whole : degrees;
 }
 
-/** The columns of a table by its header: {at: the places of four angles and r, g, b; radians; others}. */
+/** Theta and phi of the unit vector in three numbers, in degrees. */
+function anglesOf(vector) {
+  const length = Math.hypot(...vector), [x, y, z] = vector, s = Math.hypot(x, y);
+  if (!(Math.abs(length - 1) <= 1e-6)) throw new Error(`expected a unit vector, its length is ${length}`);
+  if (!(z > 0)) throw new Error("expected directions above the surface");
+  return [Math.atan2(s, z), s > 1e-9 ? Math.atan2(y, x) : 0].map((radians) => (radians * 180) / Math.PI);
+}
+
+/** Gives angles that rounding made different the same steps. */
+function removeRounding(rows) {
+  for (let k = 0; k < 4; ++k) {
+    const matters = rows.filter(({ steps }) => k % 2 === 0 || steps[k - 1] !== 0);
+    for (const { steps } of matters) if (k % 2 && steps[k] > 360 * STEPS - ROUNDING) steps[k] = 0;
+    const all = [...new Set(matters.map(({ steps }) => steps[k]))].sort((a, b) => a - b), rounded = new Map();
+    for (let first = 0, last; first < all.length; first = last) {
+      for (last = first + 1; last < all.length && all[last] - all[last - 1] < ROUNDING;) ++last;
+      const same = all.slice(first, last);
+      const mean = same[0] < ROUNDING ? 0 : Math.round(same.reduce((a, b) => a + b) / same.length);
+      for (const step of same) rounded.set(step, mean);
+    }
+    for (const { steps } of matters) steps[k] = rounded.get(steps[k]);
+  }
+}
+
+/** The columns of a table by its header: {at: the places of the directions and r, g, b; vectors; radians; others}. */
 function columnsOf(header) {
   const names = fieldsOf(header.replace(/^\uFEFF/, "")).map((name) => name.toLowerCase());
   for (const [separator, title] of [[";", "semicolons"], ["\t", "tabs"]])
     if (names.length === 1 && header.includes(separator)) throw new Error(`line 1: expected fields separated by commas, got ${title}`);
-  if (names.includes("wi_x"))
-    throw new Error("expected angles, theta_i,phi_i,theta_o,phi_o,r,g,b: the page does not read unit vectors, brdfc measured does");
+  const vectors = names.includes("wi_x");
   const unit = ["_deg", "_rad"].find((u) => names.includes(`theta_i${u}`)) || "";
-  const expected = [...ANGLES.map((name) => name + unit), "r", "g", "b"];
+  const expected = [...(vectors ? VECTORS : ANGLES.map((name) => name + unit)), "r", "g", "b"];
   const at = expected.map((name) => names.indexOf(name));
   if (at.includes(-1))
     throw new Error(`expected a header with the columns ${expected.join(",")}; ${expected[at.indexOf(-1)]} is missing`);
   const twice = expected.find((name) => names.indexOf(name) !== names.lastIndexOf(name));
   if (twice) throw new Error(`expected one column ${twice}, found several`);
   const others = names.filter((name) => !expected.includes(name));
-  return { names, at, expected, radians: unit === "_rad", plain: unit === "", others };
+  return { names, at, expected, vectors, radians: unit === "_rad", plain: !vectors && unit === "", others };
 }
 
 /** The rows of a table: {steps: four angles, value, line}, and how many numbers are negative. */
@@ -47,18 +70,25 @@ function rowsOf(text) {
     const fields = fieldsOf(lines[i]), where = `line ${i + 1}`;
     if (fields.length !== columns.names.length)
       throw new Error(`${where}: expected ${columns.names.length} values as in the header, got ${fields.length}`);
-    const [a, b, c, d, ...value] = columns.at.map((at, k) => {
+    const numbers = columns.at.map((at, k) => {
       const number = /^[\d.e+-]+$/i.test(fields[at]) ? Number(fields[at]) : NaN;
       if (!Number.isFinite(Math.fround(number)))
         throw new Error(`${where}: ${columns.expected[k]}: expected a finite number, got '${fields[at].slice(0, 40)}'`);
       return number;
     });
-    const angles = [a, b, c, d].map((x) => (columns.radians ? degreesOf(x) : x));
+    const value = numbers.slice(-3);
+    let angles;
+    try {
+      if (columns.vectors) angles = [...anglesOf(numbers.slice(0, 3)), ...anglesOf(numbers.slice(3, 6))];
+      else angles = numbers.slice(0, 4).map((x) => (columns.radians ? degreesOf(x) : x));
+    } catch (error) {
+      throw new Error(`${where}: ${error.message}`);
+    }
     for (const k of [0, 2])
       if (!(angles[k] >= 0 && angles[k] <= 90))
-        throw new Error(`${where}: ${columns.expected[k]}: expected ${columns.radians ? "radians from 0 to pi/2" : "degrees from 0 to 90"}, got ${[a, b, c, d][k]}`);
+        throw new Error(`${where}: ${columns.expected[k]}: expected ${columns.radians ? "radians from 0 to pi/2" : "degrees from 0 to 90"}, got ${numbers[k]}`);
     for (const k of [1, 3])
-      if (!(Math.abs(angles[k]) <= 1e6)) throw new Error(`${where}: ${columns.expected[k]}: expected an azimuth, got ${[a, b, c, d][k]}`);
+      if (!(Math.abs(angles[k]) <= 1e6)) throw new Error(`${where}: ${columns.expected[k]}: expected an azimuth, got ${numbers[k]}`);
     const steps = angles.map((x, k) => {
       const step = Math.round((k % 2 ? x - 360 * Math.floor(x / 360) : x) * STEPS);
       return k % 2 && step === 360 * STEPS ? 0 : step;
@@ -67,15 +97,18 @@ function rowsOf(text) {
     rows.push({ steps, value: value.map((x) => Math.fround(Math.max(x, 0))), line: i + 1 });
   }
   if (!rows.length) throw new Error("expected rows below the header, found none");
+  if (columns.vectors) removeRounding(rows);
   return { rows, negative, columns };
 }
 
 /** The mean of rows by place, where azimuths of directions along the normal are 0, and by how much rows differ. */
-function placesOf(rows) {
+function placesOf(rows, vectors) {
   const places = new Map(), lines = new Map();
   for (const { steps, value, line } of rows) {
     const key = String(steps), before = lines.get(key);
-    if (before) {
+    // A direction along the normal has no azimuth: several rows may be of it.
+    const several = vectors && [0, 2].some((k) => steps[k] === 0 && steps[k + 1] === 0);
+    if (before && !several) {
       if (String(before.value) === String(value)) continue;
       const angles = ANGLES.map((name, k) => `${name} ${steps[k] / STEPS}`).join(", ");
       throw new Error(`line ${line}: expected each combination of angles once, or the same values: ${angles} is in line ${before.line}, too`);
@@ -145,7 +178,7 @@ async function readUtia(file) {
 
 async function readTable(file) {
   const { rows, negative, columns } = rowsOf(await file.text());
-  const { places, spread } = placesOf(rows);
+  const { places, spread } = placesOf(rows, columns.vectors);
   // An azimuth counts where it matters: not along the normal.
   const axes = ANGLES.map((_, k) => {
     const steps = rows.map((row) => row.steps).filter((s) => k % 2 === 0 || s[k - 1] !== 0).map((s) => s[k]);

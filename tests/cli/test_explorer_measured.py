@@ -58,8 +58,11 @@ def table(theta_i, phi_i, theta_o, phi_o, unit=""):
         lobe = np.exp(-9 * (1 - h[:, 2]))
     f = 0.05 + lobe[:, None] * np.array([0.2, 0.15, 0.1])
     names = [name + unit for name in ("theta_i", "phi_i", "theta_o", "phi_o")]
-    rows = np.hstack([radians if unit == "_rad" else grid, f]).tolist()
-    text = "\r\n".join(",".join(f"{x:.9g}" for x in row) for row in rows)
+    given, digits = radians if unit == "_rad" else grid, 9
+    if unit == "vectors":
+        names, given, digits = COLUMNS.split(","), np.hstack([wi, wo]), 7
+    rows = np.hstack([given, f]).tolist()
+    text = "\r\n".join(",".join(f"{x:.{digits}g}" for x in row) for row in rows)
     return (",".join([*names, "r", "g", "B"]) + "\r\n\r\n" + text).encode()
 
 
@@ -83,6 +86,11 @@ def files(tmp_path_factory):
         "anisotropic.csv": table(
             range(0, 81, 20), range(0, 360, 30), range(0, 91, 15), range(15, 360, 30), "_rad"
         ),
+        "vectors.csv": table(
+            range(0, 81, 20), range(0, 360, 30), range(0, 81, 16), range(0, 360, 45), "vectors"
+        ),
+        "long.csv": f"{COLUMNS},r,g,b\n0,0,1,0,0,1.1,1,1,1\n".encode(),
+        "below.csv": f"{COLUMNS},r,g,b\n0,0,1,0,0,-1,1,1,1\n".encode(),
         "gap.csv": table([0, 40], 0, [0, 40], [0, 90, 180]).rsplit(b"\r\n", 1)[0],
         "empty.csv": b"",
         "text.csv": b"theta_i,phi_i,theta_o,phi_o,r,g,b\n0,0,0,0,1,1,red\n",
@@ -197,6 +205,7 @@ FILES = (
     "isotropic.csv",
     "circle.csv",
     "anisotropic.csv",
+    "vectors.csv",
     "isotropic.bsdf",
     "anisotropic.bsdf",
     "quarter.bsdf",
@@ -213,7 +222,7 @@ def test_values_and_albedos_are_those_of_the_tool(browser, files, name):
     assert np.abs(found[:, :3] - truth).max() < TOLERANCE * truth.max()
     assert (found[:, 3] > 0).all()
     # The tool's are means over eight azimuths.
-    azimuths = (np.arange(8) * np.pi / 4).tolist() if name[0] in "aqu" else [0]
+    azimuths = (np.arange(8) * np.pi / 4).tolist() if name[0] in "aquv" else [0]
     got = browser.run(f"{azimuths}.map((a) => Array.from(renderer.albedo(state.slots[0], 46, a)))")
     got = np.reshape(got, (len(azimuths), -1, 4)).mean(0)[[1, 15, 30, 40], :3]
     assert got == pytest.approx(np.array(albedo_of_the_tool(files / name, "2,30,60,80")), abs=0.01)
@@ -270,6 +279,8 @@ BAD = {
     "twice.csv": "line 3: expected each combination of angles once, or the same values: theta_i 9, "
     "phi_i 0, theta_o 9, phi_o 0 is in line 2, too.",
     "radians.csv": "expected degrees, and all are small",
+    "long.csv": "line 2: expected a unit vector, its length is 1.1.",
+    "below.csv": "line 2: expected directions above the surface.",
     "semicolons.csv": "expected fields separated by commas, got semicolons.",
     "dark.csv": "expected a number above 0, found none: the data are black.",
     "spectral.bsdf": "rgb: expected colours: the page does not read spectra",
