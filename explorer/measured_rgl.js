@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads RGL's files with colours, as generator/measured/rgl.cpp, tensor_file.cpp and warp.cpp.
+// Reads RGL's files, as generator/measured/rgl.cpp, tensor_file.cpp and warp.cpp.
 "use strict";
 
 const TENSOR_MAGIC = "tensor_file\0";
@@ -114,25 +114,54 @@ function cumulative({ data, width, height, count }) {
   return out;
 }
 
+/**
+ * What the numbers of each wavelength of a file add to red, green and blue: spectra are linear between wavelengths and
+ * constant beyond.
+ */
+function sharesOf(nm) {
+  const out = Array.from(nm, () => [0, 0, 0]), { first, step, rgb } = BRDFC.spectrum;
+  rgb.forEach((color, i) => {
+    const at = first + step * i, after = nm.findIndex((x) => x >= at), last = nm.length - 1;
+    const second = after < 0 ? last : after, before = after < 0 ? last : Math.max(after - 1, 0);
+    const weight = before === second ? 1 : (at - nm[before]) / (nm[second] - nm[before]);
+    for (let c = 0; c < 3; ++c) {
+      out[second][c] += weight * color[c];
+      if (before !== second) out[before][c] += (1 - weight) * color[c];
+    }
+  });
+  return out;
+}
+
+/** What each plane of a file's values adds to red, green and blue, and the name of their field. */
+function channelsOf(tensors) {
+  if (!tensors.fields.has("wavelengths")) return { name: "rgb", shares: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] };
+  const nm = tensors.axis("wavelengths");
+  if (nm[0] > 430 || nm.at(-1) < 650) throw new Error(`wavelengths: expected 430 to 650 nm at least, got ${nm[0]} to ${nm.at(-1)}`);
+  return { name: "spectra", shares: sharesOf(nm) };
+}
+
 async function readRgl(file) {
   const tensors = new TensorFile(await file.arrayBuffer());
   const phis = tensors.axis("phi_i"), thetas = tensors.axis("theta_i"), count = phis.length * thetas.length;
   if (thetas[0] < 0 || thetas.at(-1) > 1.5708) throw new Error(`theta_i: expected radians from 0 to pi / 2, got ${thetas[0]} to ${thetas.at(-1)}`);
   if (Math.max(Math.abs(phis[0]), Math.abs(phis.at(-1))) > 6.2832) throw new Error(`phi_i: expected radians, got ${phis[0]} to ${phis.at(-1)}`);
   const ndf = tensors.slices("ndf", 1, 2), sigma = tensors.slices("sigma", 1, 2), vndf = tensors.slices("vndf", count, 4);
-  if (tensors.fields.has("wavelengths"))
-    throw new Error("rgb: expected colours: the page does not read spectra, brdfc measured does; the database has each material as an RGB file, too");
-  const shape = tensors.shape("rgb", 5), [height, width] = shape.slice(-2), size = width * height;
-  if (String(shape.slice(0, 3)) !== String([phis.length, thetas.length, 3]) || width < 2 || height < 2)
-    throw new Error(`rgb: expected ${phis.length} x ${thetas.length} x 3 x n x n numbers, n at least 2, got ${shape.join(" x ")}`);
-  const planes = tensors.numbers("rgb"), rgb = new Float32Array(planes.length), notes = [];
+  const { name, shares } = channelsOf(tensors), channels = shares.length;
+  const shape = tensors.shape(name, 5), [height, width] = shape.slice(-2), size = width * height;
+  if (String(shape.slice(0, 3)) !== String([phis.length, thetas.length, channels]) || width < 2 || height < 2)
+    throw new Error(`${name}: expected ${phis.length} x ${thetas.length} x ${channels} x n x n numbers, n at least 2, got ${shape.join(" x ")}`);
+  const planes = tensors.numbers(name), rgb = new Float32Array(3 * count * size), notes = [];
   let negative = 0, largest = 0, jacobian = true;
-  for (let i = 0; i < planes.length; ++i) {
-    const slice = Math.floor(i / (3 * size)), c = Math.floor(i / size) % 3;
-    rgb[3 * (slice * size + (i % size)) + c] = planes[i];
-    negative += planes[i] < 0;
-    largest = Math.max(largest, planes[i]);
-  }
+  // The conversion of spectra is linear, as interpolation is, so it may come first.
+  for (let slice = 0; slice < count; ++slice)
+    for (let i = 0; i < size; ++i)
+      for (let c = 0; c < 3; ++c) {
+        let value = 0;
+        for (let k = 0; k < channels; ++k) value += shares[k][c] * planes[(slice * channels + k) * size + i];
+        rgb[3 * (slice * size + i) + c] = value;
+        negative += value < 0;
+        largest = Math.max(largest, value);
+      }
   if (!(largest > 0)) throw new Error("expected a number above 0, found none: the data are black");
   if (tensors.fields.has("jacobian")) {
     const { place, entries } = tensors.field("jacobian", UINT8);
@@ -151,7 +180,7 @@ async function readRgl(file) {
   return {
     about:
       `Measured, in RGL's format: ${isotropic ? "isotropic" : "anisotropic"}, ${phis.length} x ${thetas.length} ` +
-      `directions of view, ${height} x ${width} of light.`,
+      `directions of view, ${height} x ${width} of light${name === "spectra" ? `, ${channels} wavelengths` : ""}.`,
     notes,
     glsl: "measured_rgl",
     tables: {

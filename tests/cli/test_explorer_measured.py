@@ -107,6 +107,9 @@ def files(tmp_path_factory):
         "anisotropic.bsdf": tensor(rgl_fields("anisotropic")),
         "quarter.bsdf": tensor(rgl_fields("quarter")),
         "spectral.bsdf": tensor(rgl_fields("spectral")),
+        "infrared.bsdf": tensor(
+            rgl_fields("spectral") | {"wavelengths": np.linspace(800, 900, 13, dtype=np.float32)}
+        ),
         "not.bsdf": bytes(1000),
         "short.bsdf": tensor(rgl_fields("isotropic"))[:-1],
         "head.bsdf": tensor(rgl_fields("isotropic"))[:40],
@@ -209,6 +212,7 @@ FILES = (
     "isotropic.bsdf",
     "anisotropic.bsdf",
     "quarter.bsdf",
+    "spectral.bsdf",
     "utia.bin",
 )
 
@@ -283,7 +287,7 @@ BAD = {
     "below.csv": "line 2: expected directions above the surface.",
     "semicolons.csv": "expected fields separated by commas, got semicolons.",
     "dark.csv": "expected a number above 0, found none: the data are black.",
-    "spectral.bsdf": "rgb: expected colours: the page does not read spectra",
+    "infrared.bsdf": "wavelengths: expected 430 to 650 nm at least, got 800 to 900.",
     "short.bin": "expected 1990656 bytes, 3 planes of 288 x 288 doubles, as UTIA's files have, got "
     "1000: truncated?",
     "nan.bin": "red: found NaN in row 0, column 0: expected finite numbers",
