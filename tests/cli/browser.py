@@ -3,9 +3,11 @@
 wait for the page, or give it files, need it."""
 
 import base64
+import html
 import itertools
 import json
 import os
+import re
 import select
 import subprocess
 import time
@@ -14,6 +16,22 @@ FLAGS = (
     "--headless=new --no-sandbox --disable-dev-shm-usage --no-first-run --hide-scrollbars "
     "--use-angle=swiftshader --enable-unsafe-swiftshader --remote-debugging-pipe"
 ).split()
+
+
+DUMP_FLAGS = (
+    "--headless=new --no-sandbox --disable-dev-shm-usage --no-first-run --enable-logging=stderr "
+    "--use-angle=swiftshader --enable-unsafe-swiftshader --dump-dom"
+).split()
+
+
+def found_by_page(program, profile, address):
+    """The JSON that a page leaves in <pre id="found"> when it has loaded, and what the browser
+    reported, by lines."""
+    command = [program, *DUMP_FLAGS, f"--user-data-dir={profile}", address]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    found = re.search(r'<pre id="found">(.+?)</pre>', done.stdout, re.S)
+    assert found, done.stderr[-2000:]
+    return json.loads(html.unescape(found[1])), done.stderr.splitlines()
 
 
 class Browser:

@@ -6,22 +6,17 @@ has, which Chromium runs.
 """
 
 import csv
-import html
 import io
 import json
-import re
 import subprocess
 
 import numpy as np
 import pytest
+from browser import found_by_page
 from support import BROWSERS, CHROMIUM, LISTED, TOOL, run
 
 pytestmark = pytest.mark.slow
 
-FLAGS = (
-    "--headless=new --no-sandbox --disable-dev-shm-usage --no-first-run --enable-logging=stderr "
-    "--use-angle=swiftshader --enable-unsafe-swiftshader --dump-dom"
-).split()
 PAGE = """<pre id="found"></pre><script>
 const gl = document.createElement("canvas").getContext("webgl2");
 gl.getExtension("EXT_color_buffer_float");
@@ -138,11 +133,7 @@ def values(folder, tmp_path_factory):
     data = f"<script>const PAIRS = {json.dumps(PAIRS)}, FILES = {json.dumps(files)};</script>"
     page.write_text(data + PAGE, encoding="utf-8")
     profile = tmp_path_factory.mktemp("profile")
-    command = [CHROMIUM, *FLAGS, f"--user-data-dir={profile}", page.as_uri()]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
-    found = re.search(r'<pre id="found">(.+?)</pre>', done.stdout, re.S)
-    assert found, done.stderr[-2000:]
-    return json.loads(html.unescape(found[1]))
+    return found_by_page(CHROMIUM, profile, page.as_uri())[0]
 
 
 def test_every_model_that_scatters_has_a_file(folder):
