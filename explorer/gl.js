@@ -59,6 +59,35 @@ function modelSource(slot, k, needed, functions, tables) {
   return out;
 }
 
+/**
+ * A model of BRDFC.models for measured data, which has no parameters: `name` is its key, in GLSL, too. The data are in
+ * tables, as Renderer.addMeasured() makes them.
+ */
+function measuredModel(name, label, file, data) {
+  const wi = "vec3(wi_x, wi_y, wi_z)", wo = "vec3(wo_x, wo_y, wo_z)";
+  const pair = "float wi_x, float wi_y, float wi_z, float wo_x, float wo_y, float wo_z";
+  const rows = `table_${name}_rows`, tables = [...Object.keys(data.tables), "rows"].map((t) => `${name}_${t}`);
+  const given = [...Object.keys(data.tables).map((t) => `table_${name}_${t}`), ...data.constants].join(", ");
+  const value = (light) => `${data.glsl}_eval(${given}, ${light}, ${wo})`;
+  const functions = {
+    [`${name}_eval`]: { tables, text: `vec3 ${name}_eval(${pair}) { return ${value(wi)}; }\n` },
+    [`${name}_pdf`]: { tables, text: `float ${name}_pdf(${pair}) { return measured_pdf(${rows}, ${wi}, ${wo}); }\n` },
+    [`${name}_sample`]: {
+      tables,
+      text:
+        `void ${name}_sample(float wo_x, float wo_y, float wo_z, float u_x, float u_y, float u_z, out float wi_x, ` +
+        "out float wi_y, out float wi_z, out vec3 weight, out float pdf)\n{\n" +
+        `    vec3 wi = measured_sample(${rows}, ${wo}, vec3(u_x, u_y, u_z));\n` +
+        "    wi_x = wi.x;\n    wi_y = wi.y;\n    wi_z = wi.z;\n" +
+        `    pdf = measured_pdf(${rows}, wi, ${wo});\n` +
+        `    weight = pdf > 0.0 ? ${value("wi")} * wi.z / pdf : vec3(0.0);\n}\n`,
+    },
+  };
+  const formulas = { eval: `${name}_eval`, pdf: `${name}_pdf`, sample: `${name}_sample`, through: false };
+  const doc = [data.about, ...data.notes.map((note) => `${note}.`)].join(" ");
+  return { label, look: "measured", file, doc, glsl: data.glsl, parameters: [], formulas: { "": formulas }, functions };
+}
+
 class Renderer {
   /** Throws an Error that says what the browser lacks. */
   constructor() {
@@ -102,6 +131,7 @@ class Renderer {
     const text = [
       "#version 300 es\nprecision highp float;\nprecision highp int;\nprecision highp sampler2D;",
       BRDFC.glsl.library,
+      ...this.measuredGlsl(slots),
       ...[...tables].map((t) => `uniform sampler2D table_${t};`),
       ...functions.values(),
       ...wrappers,
@@ -127,11 +157,17 @@ class Renderer {
     return made;
   }
 
+  /** The GLSL that is written by hand for the measured data among models. */
+  measuredGlsl(slots) {
+    const names = slots.map((s) => BRDFC.models[s.model].glsl).filter(Boolean);
+    return names.length ? [BRDFC.glsl.measured, ...[...new Set(names)].map((n) => BRDFC.glsl[n])] : [];
+  }
+
   texture(width, height, format, data) {
     const { gl } = this;
     const texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    const layout = format === gl.R32F ? gl.RED : gl.RGBA;
+    const layout = { [gl.R32F]: gl.RED, [gl.RGB32F]: gl.RGB }[format] || gl.RGBA;
     gl.texImage2D(gl.TEXTURE_2D, 0, format, width, height, 0, layout, gl.FLOAT, data);
     for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
     return texture;
@@ -147,6 +183,40 @@ class Renderer {
       this.tables.set(name, this.texture(TABLE_COLUMNS, rows, this.gl.R32F, padded));
     }
     return this.tables.get(name);
+  }
+
+  /** Makes the tables of a measuredModel() that is in BRDFC.models. */
+  addMeasured(name, tables) {
+    try {
+      this.fillMeasured(name, tables);
+    } catch (error) {
+      for (const table of [...Object.keys(tables), "rows"]) {
+        this.gl.deleteTexture(this.tables.get(`${name}_${table}`) || null);
+        this.tables.delete(`${name}_${table}`);
+      }
+      throw error;
+    }
+  }
+
+  fillMeasured(name, tables) {
+    const { gl } = this;
+    const most = gl.getParameter(gl.MAX_TEXTURE_SIZE);
+    while (gl.getError() !== gl.NO_ERROR);
+    for (const [table, { width, height, channels, data }] of Object.entries(tables)) {
+      if (height > most) throw new Error("expected less data: they are too many for this device");
+      const format = { 1: gl.R32F, 3: gl.RGB32F, 4: gl.RGBA32F }[channels];
+      this.tables.set(`${name}_${table}`, this.texture(width, height, format, data));
+    }
+    if (gl.getError() !== gl.NO_ERROR) throw new Error("expected less data: this device has no memory for them");
+    // The data themselves tell how to sample them: any rows do to evaluate f.
+    const rows = (data) => {
+      const key = `${name}_rows`;
+      if (this.tables.has(key)) gl.deleteTexture(this.tables.get(key));
+      this.tables.set(key, this.texture(HALF_ROWS + 1, 1, gl.RGBA32F, data));
+    };
+    rows(new Float32Array(4 * HALF_ROWS + 4));
+    const pairs = halfVectorPairs();
+    rows(halfVectorRows(pairs, this.evaluate({ model: name, values: {} }, pairs.lights, pairs.views)));
   }
 
   /** A float texture that can be drawn into; one of these for each key, made anew if its size changes. */
@@ -239,7 +309,8 @@ class Renderer {
   /** The albedo, four numbers an angle, for `count` angles evenly from 0 to nearly 90 degrees. */
   albedo(slot, count, azimuth) {
     const made = this.program("albedo", [slot], ["sample", "mirror", "transmit"]);
-    const target = this.target("albedo", count, 32);
+    // Data are not sampled as well as formulas.
+    const rows = BRDFC.models[slot.model].file ? 128 : 32, target = this.target(`albedo ${rows}`, count, rows);
     this.draw(made, target, [slot], { columns: count - 1, azimuth });
     return this.columns(target);
   }

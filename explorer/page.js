@@ -10,7 +10,7 @@ const ALBEDO_ANGLES = 46;
 const SLOW_FRAME = 150;
 /** Parameters of a model that are shown at once; the others unfold. */
 const SHOWN_PARAMETERS = 8;
-const LOOKS = { matte: "Matte", glossy: "Glossy", metal: "Metal", glass: "Glass", special: "Special" };
+const LOOKS = { matte: "Matte", glossy: "Glossy", metal: "Metal", glass: "Glass", special: "Special", measured: "Measured files" };
 
 const byId = (id) => document.getElementById(id);
 const radians = (degrees) => (degrees * Math.PI) / 180;
@@ -103,7 +103,13 @@ const OPTIONS = {
 const FIRST_MODELS = ["microfacet", "ward"];
 const FIRST_LAMP = [-0.45, 0.5];
 
-/** Everything that a link carries. `lamp` is a place on the picture, of which lampDirection() makes a direction. */
+/** The name of the measured file that a slot shows, if it shows one. */
+const fileOf = (slot) => BRDFC.models[slot.model].file;
+
+/**
+ * Everything that a link carries, and files, which it can't. `lamp` is a place on the picture, of which lampDirection()
+ * makes a direction.
+ */
 const state = { slots: [], lamp: FIRST_LAMP };
 
 /** The direction to the lamp: in the picture's centre it is at the viewer, 100 degrees off where the sphere ends. */
@@ -114,8 +120,9 @@ function lampDirection([x, y]) {
   return [(Math.sin(angle) * x) / r, (Math.sin(angle) * y) / r, Math.cos(angle)];
 }
 
+/** A link can't carry the data of files, which are left out. */
 function addressOf() {
-  const parts = state.slots.map((slot) => {
+  const parts = state.slots.filter((slot) => !fileOf(slot)).map((slot) => {
     const values = changed(slot).map(([p, v]) => `${p.name}=${p.kind === "color" ? colorText(v, ":") : v}`);
     return `m=${[slot.model, ...values].join(",")}`;
   });
@@ -150,7 +157,7 @@ function readAddress(hash) {
     const [name, text = ""] = assignmentOf(part);
     if (name === "m") {
       const [model, ...assignments] = text.split(",");
-      if (!Object.hasOwn(BRDFC.models, model) || state.slots.length === MOST_MODELS) {
+      if (!Object.hasOwn(BRDFC.models, model) || BRDFC.models[model].file || state.slots.length === MOST_MODELS) {
         wrong.push(part);
         continue;
       }
@@ -473,6 +480,9 @@ function parameterControl(slot, p, k, update) {
   );
 }
 
+/** The name of a file as a word of a shell. */
+const shellWord = (name) => (/^\w[\w.+-]*$/.test(name) ? name : `'./${name.replaceAll("'", "'\\''")}'`);
+
 /** How to have the same elsewhere: [where, text]. */
 function recipes(slot) {
   const set = changed(slot);
@@ -483,8 +493,17 @@ function recipes(slot) {
   // The pair of directions that the slice has its mirror direction at.
   const phi = radians(state.azimuth), theta = radians(state.theta);
   const [wi, wo] = [direction(-theta, phi), direction(theta, phi)].map((w) => w.map((x) => Number(x.toFixed(9))));
+  const directions = `printf 'wi_x,wi_y,wi_z,wo_x,wo_y,wo_z\\n${[...wi, ...wo].join(",")}\\n'`;
+  const file = fileOf(slot);
+  if (file)
+    return [
+      ["Command", `${directions} | brdfc measured ${shellWord(file)} --pairs`],
+      ["Fits", `brdfc measured ${shellWord(file)}`],
+      ["Python", `import brdfc\nwi, wo = [${wi.join(", ")}], [${wo.join(", ")}]\nprint(brdfc.measured(${JSON.stringify(file)}).eval(wi, wo))`],
+      ["Blender", `from bl_ext.user_default.brdfc_shaders import api\napi.new_measured_material(${JSON.stringify(file)})`],
+    ];
   return [
-    ["Command", `printf 'wi_x,wi_y,wi_z,wo_x,wo_y,wo_z\\n${[...wi, ...wo].join(",")}\\n' | brdfc eval ${slot.model}${plain}`],
+    ["Command", `${directions} | brdfc eval ${slot.model}${plain}`],
     ["Python", `import brdfc\nwi, wo = [${wi.join(", ")}], [${wo.join(", ")}]\nprint(brdfc.model("${slot.model}").eval(wi, wo${named}))`],
     ["Blender", `from bl_ext.user_default.brdfc_shaders import api\napi.new_material("${slot.model}"${named})`],
   ];
@@ -542,13 +561,15 @@ function slotCard(slot, k) {
     changedState("pictures", "slice", "albedo", "difference");
   };
   const controls = model.parameters.map((p) => parameterControl(slot, p, k, update));
+  const file = fileOf(slot);
   const head = make("div", { class: "head" }, modelMenu(slot, k));
   const reset = () => {
     state.slots[k] = { model: slot.model, values: defaultsOf(slot.model) };
     rebuild();
     document.querySelectorAll("#slots .head")[k].querySelector("button").focus();
   };
-  head.append(make("button", { type: "button", title: "Set all parameters to their defaults", onclick: reset }, "Reset"));
+  if (!file)
+    head.append(make("button", { type: "button", title: "Set all parameters to their defaults", onclick: reset }, "Reset"));
   if (state.slots.length > 1)
     head.append(make("button", {
       type: "button", "aria-label": `Remove model ${k + 1}`, title: "Remove",
@@ -562,6 +583,14 @@ function slotCard(slot, k) {
     card.append(make("details", { open }, make("summary", {}, `${rest.length} more parameters`), ...rest));
   }
   copies.append(...recipeList(slot));
+  if (file) {
+    card.append(
+      make("p", { class: "note" }, "The data stay in this browser: nothing is sent."),
+      make("details", { open: true }, make("summary", {}, "Copy"), copies,
+        make("p", { class: "note" }, "A link to this page, its address, can't carry the file: whoever opens it has to add the file, too.")),
+    );
+    return card;
+  }
   card.append(
     make("details", { open: true }, make("summary", {}, "Paper and equations"), make("dl", {},
       make("dt", {}, "Paper"), make("dd", {}, model.paper), make("dt", {}, "Equations"), make("dd", {}, model.equations))),
@@ -630,11 +659,94 @@ function rebuild() {
 
 function addModel() {
   const last = BRDFC.models[state.slots.at(-1).model];
-  const free = Object.keys(BRDFC.models).filter((m) => !state.slots.some((s) => s.model === m));
+  const free = Object.keys(BRDFC.models).filter((m) => !BRDFC.models[m].file && !state.slots.some((s) => s.model === m));
   const model = free.find((m) => BRDFC.models[m].look === last.look) || free[0];
   state.slots.push({ model, values: defaultsOf(model) });
   rebuild();
   [...document.querySelectorAll("#slots .head select")].at(-1).focus();
+}
+
+// ---- Measured files -----------------------------------------------------------------------------
+
+/** Keys of BRDFC.models by what tells files apart, and how many keys there were. */
+const files = new Map();
+let fileKeys = 0;
+
+/** Reads a file and returns the key of its model, which the menus of models offer from then on. */
+async function modelOfFile(file) {
+  const known = `${file.name} ${file.size} ${file.lastModified}`;
+  if (!files.has(known)) {
+    const data = await readMeasured(file), name = `file${++fileKeys}`;
+    const namesakes = Object.values(BRDFC.models).filter((m) => m.file === file.name).length;
+    const label = namesakes ? `${file.name}, ${namesakes + 1}` : file.name;
+    BRDFC.models[name] = measuredModel(name, label, file.name, data);
+    try {
+      renderer.addMeasured(name, data.tables);
+    } catch (error) {
+      delete BRDFC.models[name];
+      throw new Error(`${file.name}: ${error.message}.`);
+    }
+    files.set(known, name);
+  }
+  return files.get(known);
+}
+
+/** Files are read one after another, also those that are dropped while others are read. */
+let reading = Promise.resolve();
+function addFiles(list) {
+  reading = reading.then(() => showFiles(list)).catch(fail);
+  return reading;
+}
+
+/** Shows files as the first models: the difference is then divided by the light of the data. Says what is wrong. */
+async function showFiles(list) {
+  if (!renderer) return;
+  const wrong = [], added = [];
+  byId("status").textContent = `Reading ${list.map((f) => f.name).join(", ")}.`;
+  for (const file of list) {
+    try {
+      const model = await modelOfFile(file);
+      if (added.includes(model) || state.slots.some((s) => s.model === model)) continue;
+      if (state.slots.length + added.length < MOST_MODELS) added.push(model);
+      else wrong.push(`${file.name}: ${MOST_MODELS} models are shown already; choose the file in the menu of one of them, to show it instead.`);
+    } catch (error) {
+      wrong.push(error.message);
+    }
+  }
+  state.slots.unshift(...added.map((model) => ({ model, values: {} })));
+  byId("status").textContent = added.length ? `Shown first: ${added.map((m) => BRDFC.models[m].label).join(", ")}.` : "";
+  rebuild();
+  if (wrong.length) {
+    fail(new Error(wrong.join("\n")));
+    byId("error").scrollIntoView({ block: "nearest" });
+  }
+}
+
+/** Files may be dropped anywhere on the page, or chosen. */
+function acceptFiles() {
+  const show = (dropping) => document.body.classList.toggle("dropping", dropping);
+  const carries = (event) => [...event.dataTransfer.types].includes("Files");
+  document.addEventListener("dragover", (event) => {
+    if (!carries(event)) return;
+    event.preventDefault();
+    event.dataTransfer.dropEffect = "copy";
+    show(true);
+  });
+  document.addEventListener("dragleave", (event) => show(event.relatedTarget !== null));
+  document.addEventListener("drop", (event) => {
+    show(false);
+    if (!carries(event)) return;
+    // Otherwise the browser would leave the page, and show the file.
+    event.preventDefault();
+    addFiles([...event.dataTransfer.files]);
+  });
+  const field = byId("file");
+  byId("add-file").addEventListener("click", () => field.click());
+  field.addEventListener("change", async () => {
+    await addFiles([...field.files]);
+    // The same file may be chosen again.
+    field.value = "";
+  });
 }
 
 function setTheme(theme) {
@@ -669,6 +781,7 @@ function begin() {
       changedState("pictures");
     });
   byId("add").addEventListener("click", addModel);
+  acceptFiles();
   byId("slice").addEventListener("pointermove", readSlice);
   byId("slice").addEventListener("pointerleave", () => redraw("slice"));
   window.addEventListener("hashchange", () => load());

@@ -18,6 +18,7 @@
 #include "core/json_text.h"
 #include "core/parse.h"
 #include "forms/form.h"
+#include "pack/brdf_files.h"
 #include "pack/pack.h"
 #include "pack/standalone.h"
 #include "pack/target.h"
@@ -32,7 +33,7 @@ namespace {
 struct Options {
   bool all = false, json = false, twin = false, fit_bases = false, osl_only = false;
   std::optional<double> error, time;  ///< percent of the light; units of Blender's Glossy node
-  std::string scene, materials, out, osl, addon;
+  std::string scene, materials, out, osl, brdf, addon;
   std::vector<std::string> models;
 };
 
@@ -151,22 +152,45 @@ void explain(const Options& options, const std::vector<plan::PlannedModel>& plan
   if (!unused.empty()) fmt::print("without the models that no material uses: {}\n", fmt::join(unused, ", "));
 }
 
+/// Refuses what only makes sense for an extension.
+void require_alone(const Options& options, const char* option) {
+  if (!options.scene.empty() || !options.materials.empty() || !options.out.empty() || !options.addon.empty() ||
+      options.error || options.time || options.json || options.twin || options.fit_bases || options.osl_only ||
+      (!options.osl.empty() && !options.brdf.empty()))
+    input_error("build: {} DIR goes with --all or --model NAME alone", option);
+}
+
+/// Writes the models as files of BRDF Explorer. All texts are made before the first file is written.
+void write_brdf(const Options& options) {
+  require_alone(options, "--brdf");
+  std::vector<const Model*> models;
+  for (const std::string& name : options.models) models.push_back(&find_model(name));
+  if (models.empty()) models = models_named("");
+  const pack::BrdfFiles files = pack::brdf_files(models, data_path("explorer") / "library.glsl");
+  for (const auto& [name, text] : files.texts) pack::write_text(std::filesystem::path(options.brdf) / name, text);
+  for (const std::string& why : files.left_out) fmt::print(stderr, "brdfc build: without {}\n", why);
+  fmt::print(stderr, "brdfc build: wrote {} files to {}\n", files.texts.size(), options.brdf);
+}
+
 /// Writes the models as OSL that needs no extension. All texts are made before the first file is written.
 void write_osl(const Options& options) {
-  if (!options.scene.empty() || !options.materials.empty() || !options.out.empty() || !options.addon.empty() ||
-      options.error || options.time || options.json || options.twin || options.fit_bases || options.osl_only)
-    input_error("build: --osl DIR goes with --all or --model NAME alone");
+  require_alone(options, "--osl");
   const auto files = pack::standalone_files(options.models);
   for (const auto& [name, text] : files) pack::write_text(std::filesystem::path(options.osl) / name, text);
   fmt::print(stderr, "brdfc build: wrote {} files to {}\n", files.size(), options.osl);
 }
 
 void run(const Options& options) {
+  if (!options.brdf.empty()) {
+    write_brdf(options);
+    return;
+  }
   if (!options.osl.empty()) {
     write_osl(options);
     return;
   }
-  if (options.out.empty()) input_error("build: expected --out DIR, the folder for the extension, or --osl DIR");
+  if (options.out.empty())
+    input_error("build: expected --out DIR, the folder for the extension, --osl DIR or --brdf DIR");
   if (int(options.all) + int(!options.scene.empty()) + int(!options.materials.empty()) + int(!options.models.empty()) !=
       1)
     input_error("build: expected one of --all, --scene FILE, --materials FILE or --model NAME");
@@ -270,6 +294,10 @@ void add_build_command(Command app) {
   c.add_option("--osl", options->osl,
                "Writes to this folder, instead of an extension, every model (or those of --model) as a shader for\n"
                "Blender's Script node, and its formulas as OSL without closures")
+      .group(where);
+  c.add_option("--brdf", options->brdf,
+               "Writes to this folder, instead of an extension, every model (or those of --model) as files of\n"
+               "Disney's BRDF Explorer, one for each combination of choices")
       .group(where);
   c.add_option("--addon", options->addon, "Folder with the add-on's Python, instead of the one in `brdfc where`")
       .group(where);

@@ -7,6 +7,7 @@
 #include "core/data_dir.h"
 #include "pack/explorer.h"
 #include "pack/target.h"
+#include "reference/color.h"
 
 namespace brdfc::app {
 namespace {
@@ -15,7 +16,9 @@ namespace fs = std::filesystem;
 
 void write_explorer(const fs::path& out) {
   pack::require_explorer(out);
-  const auto files = pack::explorer_page(models_named(""), data_path("explorer"));
+  // Not the configuration in $OCIO: the page's colours are linear Rec.709.
+  const reference::ColorConfig config(data_path("data/color/config.ocio"));
+  const auto files = pack::explorer_page(models_named(""), data_path("explorer"), config.to_rec709());
   // Files of an earlier version would otherwise stay.
   fs::remove_all(out);
   pack::make_folder(out);

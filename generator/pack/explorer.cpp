@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/json_text.h"
+#include "model/spectrum.h"
 #include "pack/addon.h"
 #include "pack/manifest.h"
 #include "pack/recorded_model.h"
@@ -129,9 +130,17 @@ Json described(const Model& model, print::Tables& tables) {
           {"functions", functions.print()}};
 }
 
+/// What each wavelength adds to red, green and blue.
+Json described_spectrum(const ToRgb& to_rgb) {
+  Json rgb = Json::array();
+  for (const Xyz& weight : xyz_weights()) rgb.push_back(to_rgb(weight));
+  return {{"first", kWavelengthMin}, {"step", kWavelengthStep}, {"rgb", std::move(rgb)}};
+}
+
 }  // namespace
 
-std::map<std::string, std::string> explorer_page(const std::vector<const Model*>& models, const fs::path& source) {
+std::map<std::string, std::string> explorer_page(const std::vector<const Model*>& models, const fs::path& source,
+                                                 const ToRgb& to_rgb) {
   if (!fs::exists(source / "index.html"))
     input_error("{}: expected the explorer's folder with index.html", source.string());
   std::map<std::string, std::string> files;
@@ -157,6 +166,7 @@ std::map<std::string, std::string> explorer_page(const std::vector<const Model*>
   add("version", BRDFC_VERSION);
   add("glsl", glsl);
   add("tables", described_tables);
+  add("spectrum", described_spectrum(to_rgb));
   text += "BRDFC.models = {};\n";
   for (const auto& [name, model] : described_models.items()) add(("models." + name).c_str(), model);
   return files;

@@ -16,14 +16,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from browser import found_by_page
 from support import BROWSERS, CHROMIUM, LISTED, MODELS, ROOT, TOOL
 
 pytestmark = pytest.mark.slow
 
-FLAGS = (
-    "--headless=new --no-sandbox --disable-dev-shm-usage --no-first-run --enable-logging=stderr "
-    "--use-angle=swiftshader --enable-unsafe-swiftshader --dump-dom"
-).split()
 #: A clear base of thin_film.
 CLEAR = "n_r={0} n_g={0} n_b={0} k_r=0 k_g=0 k_b=0"
 #: Relative errors of f and pdf in single precision; and larger ones, of extreme parameters.
@@ -263,13 +260,9 @@ def found(folder, tried, tmp_path_factory):
     (folder / "check.html").write_text(page, encoding="utf-8")
     profile = tmp_path_factory.mktemp("profile")
     address = (folder / "check.html").as_uri()
-    command = [CHROMIUM, *FLAGS, f"--user-data-dir={profile}", address]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    result = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.S)
-    assert result, done.stderr[-2000:]
-    out = json.loads(result[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
+    out, said = found_by_page(CHROMIUM, profile, address)
     out["values"] = dict(zip(tried.cases, out["values"], strict=True))
-    out["console"] = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+    out["console"] = [line for line in said if "CONSOLE" in line]
     return out
 
 
