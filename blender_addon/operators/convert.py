@@ -7,7 +7,7 @@ from bpy.props import FloatProperty
 from bpy.types import Operator
 
 from .. import api, convert
-from ..common.i18n import of_error, rpt, say
+from ..common.i18n import of_error, rpt, say, tip
 from ..groups import model_nodes
 from ..panels.labels import wrapped
 from .common import ERRORS, ChangesActiveMaterial, refused, report_osl
@@ -40,7 +40,10 @@ class BRDFC_OT_convert(Operator):
 
     @classmethod
     def poll(cls, context):
-        return bool(_selected_materials(context))
+        found = bool(_selected_materials(context))
+        if not found:
+            cls.poll_message_set(tip(say("No selected object has a material in its slots")))
+        return found
 
     #: Plans of the open dialog; None otherwise, as undo may have removed their nodes.
     _plans = None
@@ -100,7 +103,10 @@ class BRDFC_OT_to_principled(Operator):
 
     @classmethod
     def poll(cls, context):
-        return any(map(model_nodes.shown_nodes, _selected_materials(context)))
+        found = any(map(model_nodes.shown_nodes, _selected_materials(context)))
+        if not found:
+            cls.poll_message_set(tip(say("No selected object has a material with a model")))
+        return found
 
     def execute(self, context):
         done = 0

@@ -111,6 +111,23 @@ def filter_glossy(at):
     return when(wrong, value=f"{blur:g}")
 
 
+def _sends_rays(at):
+    """Whether Cycles shows a node's Formula Nodes with random directions, which it counts as glossy
+    whatever the model."""
+    is_nodes = at.cycles_form and model_nodes.identity(at.node).form == "nodes"
+    return is_nodes and not at.stood_in and at.is_current and not model_nodes.is_closure(at.node)
+
+
+def fast_gi(at):
+    """Fast GI Approximation is on, and the node has Formula Nodes with random directions."""
+    return when(at.scene.cycles.use_fast_gi and _sends_rays(at))
+
+
+def no_glossy_bounces(at):
+    """The limit of Glossy bounces is 0, and the node has Formula Nodes with random directions."""
+    return when(at.scene.cycles.glossy_bounces == 0 and _sends_rays(at))
+
+
 # ---- passes and denoising ------------------------------------------------------------------------
 
 

@@ -206,6 +206,19 @@ OF_NODE = (
         "their light is up to half too dark or too bright; apply that scale or make it even",
         lamp_rules.sheared_lamps,
     ),
+    Row(
+        "fast_gi",
+        WARNING,
+        "Fast GI Approximation is on: this material shows less of its light than Blender's own "
+        "nodes do",
+        setting_rules.fast_gi,
+    ),
+    Row(
+        "glossy_bounces",
+        WARNING,
+        "Glossy bounces are limited to 0: this material loses light that other surfaces send to it",
+        setting_rules.no_glossy_bounces,
+    ),
 )
 
 #: About a group node whose form declares the code in the manifest (Form::warnings() of the

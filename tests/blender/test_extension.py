@@ -958,6 +958,20 @@ def test_warnings_a_form_may_declare(extension, empty, monkeypatch, code, spoil)
     assert codes(extension, material, empty) == [code]
 
 
+@pytest.mark.parametrize(
+    ("code", "setting", "value"),
+    [("fast_gi", "use_fast_gi", True), ("glossy_bounces", "glossy_bounces", 0)],
+)
+def test_warnings_of_formula_nodes(extension, empty, code, setting, value):
+    """Cycles counts their random directions as glossy; others follow Blender's own nodes."""
+    empty.cycles.blur_glossy = 0
+    materials = [clean(extension, empty, "oren_nayar", form) for form in ("nodes", "aimed")]
+    materials.append(clean(extension, empty, "lambert"))
+    assert [code in codes(extension, m, empty) for m in materials] == [False, False, False]
+    setattr(empty.cycles, setting, value)
+    assert [code in codes(extension, m, empty) for m in materials] == [True, False, False]
+
+
 def test_warning_clamp_that_shows_in_exact_forms(extension, empty):
     """In a mirror always; in a highlight if the clamp is low."""
     mirror = clean(extension, empty, "coupled", "exact")
