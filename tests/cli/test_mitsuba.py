@@ -8,14 +8,14 @@ llvm_ad_rgb needs an LLVM that it can use (19 works, 14 does not), which DRJIT_L
 
 import functools
 import importlib
-import importlib.util
 import json
+import re
 import subprocess
 import sys
 
 import numpy as np
 import pytest
-from support import MODELS, TOOL, scene
+from support import MODELS, ROOT, TOOL, scene
 
 #: Relative differences of f and pdf. A scalar variant computes in double precision and returns
 #: single; llvm_ad_rgb computes in single, whose rounding narrow lobes amplify: measured 4e-6.
@@ -118,9 +118,9 @@ class Bsdf:
         mi = self.mi
         if is_scalar(mi):
             si = mi.SurfaceInteraction3f()
-            si.t = 0.0
         else:
             si = self.dr.zeros(mi.SurfaceInteraction3f, len(viewer))
+        si.t = 0.0  # infinite otherwise
         si.wi = self._vector(viewer)
         return si
 
@@ -132,7 +132,9 @@ class Bsdf:
             rows = [function(*(a[i] for a in arrays)) for i in range(len(arrays[0]))]
             return [np.array(column) for column in zip(*rows, strict=True)]
         count = len(arrays[0])
-        out = [np.array(a) for a in function(*arrays)]
+        out = function(*arrays)
+        self.dr.eval(out)  # one kernel
+        out = [np.array(a) for a in out]
         return [np.broadcast_to(a.T, (count, 3) if a.ndim > 1 else (count,)) for a in out]
 
     def eval_pdf(self, viewer, light):
@@ -394,6 +396,8 @@ def test_gradients_are_those_of_differences(llvm, name, few_of):
         si.wi = mi.Vector3f(viewer.T)
         f = bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(light.T))
         dr.backward(dr.sum(f, axis=None))
+        gradients = {key: dr.grad(parameters[key]) for key in values}
+        dr.eval(gradients)  # one kernel
 
         def total(changed, choices=choices):
             f = model.eval(light, viewer, **{**values, **changed}, **choices)
@@ -406,7 +410,7 @@ def test_gradients_are_those_of_differences(llvm, name, few_of):
                 (total({key: value + h}) - total({key: value - h})) / (2 * h)
                 for h in (step, step / 2)
             )
-            got = np.sum(np.array(dr.grad(parameters[key])))
+            got = np.sum(np.array(gradients[key]))
             size = np.abs(total({})) / (np.abs(value).max() + step)
             # At a kink two differences differ.
             allowed = 0.01 * np.abs(fine) + 0.001 * size + 10 * np.abs(fine - coarse)
@@ -441,7 +445,7 @@ def test_a_picture_has_the_gradient_of_differences(llvm, integrator):
     mi = llvm
 
     def loss(*arguments):
-        picture = mi.render(*arguments, spp=256, seed=3)
+        picture = mi.render(*arguments, spp=4096, seed=3)
         return dr.mean(picture * picture, axis=None)
 
     given = {"type": "brdfc", "model": "ward", "ks": [0.8, 0.5, 0.2], "ax": 0.25, "ay": 0.35}
@@ -659,6 +663,16 @@ LAMP = {
     "size": [0.5, 0.5],
     "power": 150,
 }
+
+
+@pytest.mark.slow
+def test_the_example_of_the_page(llvm, capsys):
+    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    (example,) = (
+        text for text in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "mitsuba" in text
+    )
+    exec(example, {})
+    assert float(capsys.readouterr().out.strip("[]\n")) == pytest.approx(0.1, abs=0.02)
 
 
 @pytest.mark.slow
