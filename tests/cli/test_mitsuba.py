@@ -6,6 +6,7 @@ where Mitsuba is installed: .env/bench/bin/python -m pytest tests/cli/test_mitsu
 llvm_ad_rgb needs an LLVM that it can use (19 works, 14 does not), which DRJIT_LIBLLVM_PATH selects.
 """
 
+import csv
 import functools
 import importlib
 import json
@@ -188,6 +189,51 @@ def test_values_are_those_on_numpy(mi, name):
         expected *= radiance_scale(model, choices, viewer, light)[:, None]
         assert off(f, expected) < ROUNDING[mi.variant()], choices
         assert off(pdf, model.pdf(light, viewer, **choices)) < ROUNDING[mi.variant()], choices
+
+
+CASES = {
+    row["model"]: row["cases"].split("|") + row["stiff"].split("|")
+    for row in csv.DictReader((ROOT / "tests/models/cases.csv").open(encoding="utf-8"))
+}
+
+#: Where single precision does not have the value: a reflectance, an exponent or an index too near
+#: to its end, or values that are 0 but for rounding.
+LOST = ("r0=0.9999999", "n=100000000", "n=1000000", "n_theta=100000000", "film_ior=1 n_r=1")
+
+
+def values_of(model, text):
+    """The parameters of a case in cases.csv: "n=3 tint=0.9:0.5:0.1"."""
+    values = {}
+    for name, value in (assignment.split("=") for assignment in text.split()):
+        is_word = kind(model.parameters[name]) == "Choice"
+        numbers = [] if is_word else [float(c) for c in value.split(":")]
+        values[name] = value if is_word else numbers[0] if len(numbers) == 1 else numbers
+    return values
+
+
+@pytest.mark.many
+@pytest.mark.parametrize("name", MODELS)
+def test_extreme_parameters(llvm, name):
+    """Narrow lobes amplify the rounding of single precision; nothing is infinite."""
+    model, random = brdf(name), np.random.default_rng(9)
+    if model.formulas[next(iter(model.formulas))].eval is None:
+        pytest.skip(f"{name} has ideal reflection and refraction alone")
+    wi, wo = unit(random.normal(size=(2, 400, 3)))
+    spread = 10 ** random.uniform(-4, -0.3, size=(200, 1)) * random.normal(size=(200, 3))
+    wi[:200] = wo[:200] * [-1, -1, 1] + spread
+    light, viewer = (
+        unit(np.abs(v) * [0, 0, 1] + v * [1, 1, 0]).astype(np.float32) for v in (wi, wo)
+    )
+    for text in CASES[name]:
+        values = values_of(model, text)
+        bsdf = Bsdf(llvm, load(llvm, name, **values), None if model.two_sided else 0)
+        f, pdf = bsdf.eval_pdf(viewer, light)
+        u = np.minimum(random.uniform(size=(400, 3)), 1 - 2.0**-24)
+        for array in (f, pdf, *bsdf.sample(viewer, u)):
+            assert np.isfinite(array).all(), text
+        if not any(lost in text for lost in LOST):
+            expected = model.eval(light, viewer, **values) * light[:, 2:].astype(float)
+            assert off(f, expected) < 0.006, text
 
 
 @pytest.mark.many
@@ -496,6 +542,16 @@ def test_textures(mi):
     expected = brdf("ward").eval(light, viewer, ks=[0.1, 0.5, 0.9], ax=0.3) * light[:, 2:]
     assert off(f, expected) < 1e-5
     assert bsdf.flags() & int(mi.BSDFFlags.SpatiallyVarying)
+
+
+def test_files_of_xml(mi):
+    bsdf = mi.load_string(
+        """<bsdf version="3.0.0" type="brdfc"> <string name="model" value="phong"/>
+        <rgb name="ks" value="0.1 0.2 0.3"/> <integer name="e" value="20"/> </bsdf>"""
+    )
+    light, viewer = pairs(np.random.default_rng(8), 40)
+    f, _ = Bsdf(mi, bsdf).eval_pdf(viewer, light)
+    assert off(f, brdf("phong").eval(light, viewer, ks=[0.1, 0.2, 0.3], e=20) * light[:, 2:]) < 1e-5
 
 
 def test_one_side_reflects_and_twosided_makes_it_both(mi):
