@@ -194,7 +194,7 @@ Result build_pack(const Options& options) {
   std::vector<const Model*> formulas;
   for (const plan::PlannedModel& plan : chosen) formulas.push_back(plan.model);
   for (const auto& [name, data] : python_package(formulas, options.python))
-    if (name.ends_with(".py")) members["brdfc/" + name] = data;
+    if (name.ends_with(".py") && name != "mitsuba.py") members["brdfc/" + name] = data;  // no use in Blender
   members["brdfc/_closures.py"] = closures_module();
   std::string everything;
   for (const auto& [name, data] : members) everything += name + '\0' + data;
