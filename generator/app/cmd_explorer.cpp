@@ -19,10 +19,7 @@ void write_explorer(const fs::path& out) {
   // Not the configuration in $OCIO: the page's colours are linear Rec.709.
   const reference::ColorConfig config(data_path("data/color/config.ocio"));
   const auto files = pack::explorer_page(models_named(""), data_path("explorer"), config.to_rec709());
-  // Files of an earlier version would otherwise stay.
-  fs::remove_all(out);
-  pack::make_folder(out);
-  for (const auto& [name, text] : files) pack::write_text(out / name, text);
+  pack::replace_content(out, files);
   std::cerr << "brdfc explorer: open " << (out / "index.html").string() << " in a browser\n";
 }
 

@@ -26,8 +26,7 @@ void run(const fs::path& out) {
   pack::make_folder(out);
   const auto files = pack::python_package(models_named(""), data_path("python/brdfc"));
   // Otherwise modules of models that no longer exist would become part of a wheel.
-  fs::remove_all(package);
-  for (const auto& [name, module] : files) pack::write_text(package / name, module);
+  pack::replace_content(package, files);
   const fs::path project = data_path("python/pyproject.toml");
   std::string text = pack::read_text(project);
   pack::stamp(text, project, "version", pack::quoted("@version@"), pack::quoted(BRDFC_VERSION));

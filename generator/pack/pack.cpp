@@ -10,7 +10,6 @@
 
 #include "core/hash.h"
 #include "core/json_text.h"
-#include "core/parse.h"
 #include "core/process.h"
 #include "fit/fit.h"
 #include "forms/form.h"
@@ -34,40 +33,6 @@ namespace fs = std::filesystem;
 constexpr const char* kFolder = "brdfc_shaders";
 /// The manifest's "generator" entry, before the version.
 constexpr const char* kGenerator = "brdfc ";
-
-/// A temporary folder beside the target, which is deleted unless it is renamed.
-class Staging {
- public:
-  explicit Staging(const fs::path& out) : path_(out / fmt::format("{}{}", kPrefix, process_id())) {
-    std::error_code error;
-    remove_abandoned(out);
-    fs::create_directories(path_, error);
-    if (error) input_error("{}: cannot be created: {}", path_.string(), error.message());
-  }
-  ~Staging() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  Staging(const Staging&) = delete;
-  Staging& operator=(const Staging&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  static constexpr const char* kPrefix = ".brdfc-build-";
-
-  /// Deletes the folders of builds that were killed: those whose process no longer exists.
-  static void remove_abandoned(const fs::path& out) {
-    std::error_code ignored;
-    for (const fs::directory_entry& entry : fs::directory_iterator(out, ignored)) {
-      const std::string name = entry.path().filename().string();
-      if (!name.starts_with(kPrefix)) continue;
-      const auto process = parse<long>(std::string_view(name).substr(std::string_view(kPrefix).size()));
-      if (process && process_is_over(*process)) fs::remove_all(entry.path(), ignored);
-    }
-  }
-
-  fs::path path_;
-};
 
 /// Moves `fresh` to `target`. Where the file system can exchange two names this is one step, so that a target always
 /// exists. Elsewhere the old folder is moved away first. It is deleted with the staging folder.
@@ -229,7 +194,7 @@ Result build_pack(const Options& options) {
   std::vector<const Model*> formulas;
   for (const plan::PlannedModel& plan : chosen) formulas.push_back(plan.model);
   for (const auto& [name, data] : python_package(formulas, options.python))
-    if (name.ends_with(".py")) members["brdfc/" + name] = data;
+    if (name.ends_with(".py") && name != "mitsuba.py") members["brdfc/" + name] = data;  // no use in Blender
   members["brdfc/_closures.py"] = closures_module();
   std::string everything;
   for (const auto& [name, data] : members) everything += name + '\0' + data;

@@ -75,6 +75,15 @@ std::string class_name(const std::string& name) {
   return out;
 }
 
+std::vector<std::string> components_of(const std::string& vector) {
+  return {vector + "_x", vector + "_y", vector + "_z"};
+}
+
+std::vector<std::string> joined(std::vector<std::string> names, const std::vector<std::string>& more) {
+  names.insert(names.end(), more.begin(), more.end());
+  return names;
+}
+
 /// The functions of a module; functions with the same text are written once.
 class NumpyFunctions {
  public:
@@ -88,10 +97,19 @@ class NumpyFunctions {
     std::string suffix;
     for (const std::string& option : options_of(model_.info(), choices)) suffix += "_" + option;
     const RecordedModel recorded = record_model(model_, choices, Precision::Double);
-    const std::array<std::string, 6> names = {
-        function("eval", suffix, recorded.eval, {"wi", "wo"}),    function("pdf", suffix, recorded.pdf, {"wi", "wo"}),
-        function("sample", suffix, recorded.sample, {"wo", "u"}), function("mirror", suffix, recorded.mirror, {"wo"}),
-        function("transmit", suffix, recorded.transmit, {"wo"}),  function("whole", suffix, recorded.whole, {})};
+    const Program& iors = recorded.iors.outputs().empty() ? recorded.ior : recorded.iors;
+    const std::vector<std::string> wi = components_of("wi"), wo = components_of("wo"), u = components_of("u"),
+                                   both = joined(wi, wo);
+    const std::array<std::string, 8> names = {
+        function("eval", suffix, recorded.eval, both),
+        function("pdf", suffix, recorded.pdf, both),
+        function("sample", suffix, recorded.sample, joined(wo, u)),
+        function("mirror", suffix, recorded.mirror, wo),
+        function("transmit", suffix, recorded.transmit, wo),
+        function("whole", suffix, recorded.whole, {}),
+        function("iors", suffix, iors, {}),
+        function("inside", suffix, recorded.inside, {"distance"}),
+    };
     return fmt::format("Formulas({})", fmt::join(names, ", "));
   }
 
@@ -104,13 +122,9 @@ class NumpyFunctions {
  private:
   /// The function's name, or None if there are no outputs.
   std::string function(const std::string& what, const std::string& suffix, const Program& program,
-                       const std::vector<std::string>& directions) {
+                       const std::vector<std::string>& inputs) {
     if (program.outputs().empty()) return "None";
-    std::vector<std::string> arguments;
-    for (const std::string& d : directions)
-      for (const char* component : {"_x", "_y", "_z"}) arguments.push_back(d + component);
-    arguments.insert(arguments.end(), parameters_.begin(), parameters_.end());
-    const std::string text = print::numpy_function(program, what, arguments, tables_);
+    const std::string text = print::numpy_function(program, what, joined(inputs, parameters_), tables_);
     const auto [it, is_new] = names_.emplace(text, what + suffix);
     if (is_new) text_ += fmt::format("\n\ndef {}{}", it->second, text.substr(4 + what.size()));
     return it->second;

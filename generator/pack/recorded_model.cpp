@@ -25,6 +25,9 @@ RecordedModel record_model(const Model& model, const Choices& choices, Precision
     const std::array<Expr, 3> of = brdf->channel_iors();
     iors = Rgb<Expr>(of[0], of[1], of[2]);
   }
+  const bool through = model.has_through() && brdf->scatters_through();
+  Expr ior(1);
+  if (through) ior = brdf->ior();
   Rgb<Expr> transmittance;
   if (model.has_medium()) transmittance = brdf->transmittance(Expr::input("distance"));
   Expr stands(0);
@@ -42,6 +45,7 @@ RecordedModel record_model(const Model& model, const Choices& choices, Precision
     out.transmit.output("weight", refracted);
     out.iors.output("iors", iors);
   }
+  if (through) out.ior.output("iors", Rgb<Expr>(ior));
   if (has_whole(model)) out.whole.output("stands", stands);
   if (model.has_medium()) out.inside.output("transmittance", transmittance);
   return out;

@@ -17,6 +17,7 @@ struct RecordedModel {
   Program mirror;    ///< weight, of wo
   Program transmit;  ///< weight, likewise
   Program iors;      ///< iors, of ideal refraction for red, green and blue
+  Program ior;       ///< iors of f where it crosses the surface, all the same
   Program inside;    ///< transmittance, of the input `distance`
   Program whole;     ///< stands, of the parameters alone: 1 where one of Cycles' closures equals the model, else 0
 };

@@ -35,57 +35,20 @@ def _own(xp: ModuleType, x) -> bool:
     return hasattr(x, "shape") and hasattr(x, "dtype") and not isinstance(x, _foreign(xp))
 
 
-class Functions:
-    """What formulas call, with arrays of one type on one device.
+class Elementwise:
+    """What formulas call for each element alone, of a library's functions `xp`.
 
     A derivative that is infinite where a formula does not use the value becomes NaN in reverse mode
     (0 * inf). So roots have a derivative of 0 at and below 0.
     """
 
-    #: The dimensions of what is not constant: a colour is (3, ...), and (3, 1, ...) if it is.
-    rank = 0
-
-    def __init__(self, xp: ModuleType, arrays: list[Array]):
-        """For these arrays of the library, which decide on type and device."""
-        self.xp = xp
-        self.device = {}
-        # JAX places constants where they are used, and what it traces is on no device.
-        if arrays and hasattr(arrays[0], "device") and not xp.__name__.startswith("jax"):
-            self.device = {"device": arrays[0].device}
-        floating = [x.dtype for x in arrays if self._is_floating(x.dtype)]
-        promote = getattr(xp, "promote_types", xp.result_type)
-        self.dtype = reduce(promote, floating) if floating else xp.asarray(0.0).dtype
-        bits = xp.finfo(self.dtype).bits
-        if bits < 32:
-            raise TypeError(f"expected single or double precision, got arrays of {self.dtype}")
-        self._least = SINGLE_GUARD if bits == 32 else 0.0
-
-    def _is_floating(self, dtype) -> bool:
-        """Whether numbers of the type are floating-point, else they are whole. TypeError for
-        others."""
-        if hasattr(dtype, "is_floating_point"):  # PyTorch's
-            floating = dtype.is_floating_point
-            whole = not floating and not dtype.is_complex and dtype != self.xp.bool
-        elif hasattr(self.xp, "isdtype"):
-            floating = self.xp.isdtype(dtype, "real floating")
-            whole = self.xp.isdtype(dtype, "integral")
-        else:
-            floating, whole = dtype.kind == "f", dtype.kind in "iu"
-        if not floating and not whole:
-            raise TypeError(f"expected real numbers, got an array of {dtype}")
-        return floating
+    xp: Any
+    #: The least that a guard lets through.
+    _least = 0.0
 
     def array(self, x) -> Array:
-        if not _own(self.xp, x):
-            return self.xp.asarray(x, dtype=self.dtype, **self.device)
-        return x if x.dtype == self.dtype else self._cast(x, self.dtype)
-
-    def _cast(self, x, dtype) -> Array:
-        if hasattr(self.xp, "astype"):
-            return self.xp.astype(x, dtype)
-        return x.to(dtype) if hasattr(x, "to") else x.astype(dtype)
-
-    # ---- elementwise ---------------------------------------------------------------------------
+        """Of the library, and of its floating-point type."""
+        raise NotImplementedError
 
     def __getattr__(self, name: str):
         """The functions that all libraries have alike: abs, cos, exp, ..."""
@@ -135,6 +98,56 @@ class Functions:
     def where(self, condition, x, y):
         return self.xp.where(condition, self.array(x), self.array(y))
 
+    def lookup(self, values, *coordinates):
+        return multilinear(self, values, coordinates)
+
+
+class Functions(Elementwise):
+    """What formulas call, with arrays of one type on one device."""
+
+    #: The dimensions of what is not constant: a colour is (3, ...), and (3, 1, ...) if it is.
+    rank = 0
+
+    def __init__(self, xp: ModuleType, arrays: list[Array]):
+        """For these arrays of the library, which decide on type and device."""
+        self.xp = xp
+        self.device = {}
+        # JAX places constants where they are used, and what it traces is on no device.
+        if arrays and hasattr(arrays[0], "device") and not xp.__name__.startswith("jax"):
+            self.device = {"device": arrays[0].device}
+        floating = [x.dtype for x in arrays if self._is_floating(x.dtype)]
+        promote = getattr(xp, "promote_types", xp.result_type)
+        self.dtype = reduce(promote, floating) if floating else xp.asarray(0.0).dtype
+        bits = xp.finfo(self.dtype).bits
+        if bits < 32:
+            raise TypeError(f"expected single or double precision, got arrays of {self.dtype}")
+        self._least = SINGLE_GUARD if bits == 32 else 0.0
+
+    def _is_floating(self, dtype) -> bool:
+        """Whether numbers of the type are floating-point, else they are whole. TypeError for
+        others."""
+        if hasattr(dtype, "is_floating_point"):  # PyTorch's
+            floating = dtype.is_floating_point
+            whole = not floating and not dtype.is_complex and dtype != self.xp.bool
+        elif hasattr(self.xp, "isdtype"):
+            floating = self.xp.isdtype(dtype, "real floating")
+            whole = self.xp.isdtype(dtype, "integral")
+        else:
+            floating, whole = dtype.kind == "f", dtype.kind in "iu"
+        if not floating and not whole:
+            raise TypeError(f"expected real numbers, got an array of {dtype}")
+        return floating
+
+    def array(self, x) -> Array:
+        if not _own(self.xp, x):
+            return self.xp.asarray(x, dtype=self.dtype, **self.device)
+        return x if x.dtype == self.dtype else self._cast(x, self.dtype)
+
+    def _cast(self, x, dtype) -> Array:
+        if hasattr(self.xp, "astype"):
+            return self.xp.astype(x, dtype)
+        return x.to(dtype) if hasattr(x, "to") else x.astype(dtype)
+
     # ---- of colours and tables -----------------------------------------------------------------
 
     def max(self, color, axis):
@@ -154,9 +167,6 @@ class Functions:
         missing = len(shape) - x.ndim
         x = self.xp.reshape(x, (1,) * missing + tuple(x.shape)) if missing else x
         return self.xp.broadcast_to(x, shape)
-
-    def lookup(self, values, *coordinates):
-        return multilinear(self, values, coordinates)
 
     def index(self, x):
         # NaN, where a formula does not use it, must not become an index that is out of range.

@@ -113,6 +113,11 @@ class Formulas(NamedTuple):
     transmit: Callable[..., Any] | None
     #: 1 where one of Cycles' closures equals the model, of parameters alone.
     whole: Callable[..., Any] | None
+    #: The refractive index inside over the one outside, by channel, of parameters alone; None where
+    #: no light crosses the surface.
+    iors: Callable[..., Any] | None
+    #: The share of the light that is left after a distance inside, of the distance and parameters.
+    inside: Callable[..., Any] | None
 
 
 class Model:

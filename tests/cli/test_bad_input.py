@@ -373,3 +373,26 @@ def test_a_scene_has_no_values_from_elsewhere(tmp_path):
     file.write_text(json.dumps(content))
     refused(run("build", "--scene", file, "--out", tmp_path), "parameters.e", "varies")
     refused(run("build", "--all", "--explain", "--out", tmp_path), "--explain")
+
+
+@pytest.mark.parametrize(
+    "command, out, kept", [("python", ".", "brdfc"), ("explorer", "page", "page")]
+)
+def test_what_can_not_be_written_whole_leaves_what_was_there(tmp_path, command, out, kept):
+    """As on a full disk: here files may have 4 KB at most."""
+    folder = tmp_path / out
+    assert run(command, "--out", folder).returncode == 0
+
+    def contents():
+        inside = tmp_path / kept
+        return {path.relative_to(inside): path.stat() for path in sorted(inside.rglob("*"))}
+
+    before = contents()
+    limited = 'ulimit -f 4; trap "" XFSZ; exec "$@"'
+    done = subprocess.run(
+        ["bash", "-c", limited, "bash", TOOL, command, "--out", folder],
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 2 and "cannot be written" in done.stderr
+    assert contents() == before
