@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Draws with WebGL 2: pictures of spheres, and numbers about models. Knows nothing of the page.
+// Draws with WebGL 2: pictures of objects, and numbers about models. Knows nothing of the page.
 "use strict";
 
 /** Columns of textures that hold tables, as in library.glsl. */
@@ -342,7 +342,7 @@ class Renderer {
   }
 
   /** Adds a sample to the picture of a slot unless that is finished; `picture` is its state, which begins as {}. */
-  addSample(picture, key, slot, view, size, lamp) {
+  addSample(picture, key, slot, view, size, lamp, shape = "sphere") {
     if (picture.samples >= SAMPLES[view]) return;
     const number = picture.samples || 0;
     const needed = view === "lamp" ? ["eval"] : ["eval", "pdf", "sample", "mirror", "transmit", "iors", "inside"];
@@ -355,7 +355,7 @@ class Renderer {
     }
     // The first sample is in the pixel's centre; the others fill the pixel evenly.
     const offset = [((number * 0.7548776662 + 0.5) % 1) - 0.5, ((number * 0.5698402910 + 0.5) % 1) - 0.5];
-    this.draw(made, to, [slot], { sum: from.texture, size: [size, size], offset, lamp, number });
+    this.draw(made, to, [slot], { sum: from.texture, size: [size, size], offset, lamp, number, is_knot: shape === "knot" });
     picture.sum = to;
     picture.samples = number + 1;
   }

@@ -91,6 +91,7 @@ const colorOf = (hex) => [1, 3, 5].map((i) => Number(toLinear(parseInt(hex.slice
 
 const OPTIONS = {
   view: { default: "lamp", choices: ["lamp", "sky", "lobe"] },
+  shape: { default: "sphere", choices: ["sphere", "knot"] },
   exposure: { default: 0, min: -4, max: 4 },
   theta: { default: 45, min: 0, max: 89 },
   azimuth: { default: 0, min: 0, max: 180 },
@@ -312,7 +313,7 @@ function drawPictures(add) {
   }
   state.slots.forEach((slot, k) => {
     if (pictures[k].sum && pictures[k].sum.width !== size) pictures[k] = {};
-    if (add || !pictures[k].sum) renderer.addSample(pictures[k], `picture ${k}`, slot, state.view, size, lamp);
+    if (add || !pictures[k].sum) renderer.addSample(pictures[k], `picture ${k}`, slot, state.view, size, lamp, state.shape);
     more = more || pictures[k].samples < SAMPLES[state.view];
     renderer.show(canvases[k], pictures[k], scale);
   });
@@ -320,9 +321,11 @@ function drawPictures(add) {
     renderer.show(byId("difference-picture"), pictures[0], scale * 2, pictures[1]);
   const { samples } = pictures[0];
   const dark = state.view === "lamp" ? labelsOf((f) => !f.eval) : "";
+  const refracting = labelsOf((f) => f.transmit);
   byId("samples").textContent =
     `Samples a pixel: ${samples} of ${SAMPLES[state.view]}.` +
-    (dark ? ` A lamp without a size is not seen in ideal reflection and refraction (${dark}): choose the sky.` : "");
+    (dark ? ` A lamp without a size is not seen in ideal reflection and refraction (${dark}): choose the sky.` : "") +
+    (state.shape === "knot" ? ` The knot casts no shadows on itself, and does not see itself${refracting ? "; it refracts as a ball would" : ""}.` : "");
   return more;
 }
 
@@ -695,13 +698,13 @@ function showOptions() {
     document.querySelector(`output[for="${name}"]`).textContent = name === "exposure" ? state[name].toFixed(1) : `${state[name]}°`;
   }
   for (const name of ["quantity", "plot", "scale", "channel"]) byId(name).value = state[name];
-  for (const radio of document.querySelectorAll('input[name="view"]')) radio.checked = radio.value === state.view;
+  for (const radio of document.querySelectorAll('input[type="radio"]')) radio.checked = radio.value === state[radio.name];
   const isLobe = state.view === "lobe";
   byId("moved").textContent = { lamp: "move the lamp", sky: "move the sun", lobe: "turn the lobes" }[state.view];
-  byId("spheres-title").textContent = isLobe ? "Lobe" : "Sphere";
-  for (const id of ["exposure-label", "difference-picture", "difference-colors"]) if (byId(id)) byId(id).hidden = isLobe;
+  byId("spheres-title").textContent = isLobe ? "Lobe" : state.shape === "knot" ? "Knot" : "Sphere";
+  for (const id of ["shapes", "exposure-label", "difference-picture", "difference-colors"]) if (byId(id)) byId(id).hidden = isLobe;
   document.querySelectorAll("#pictures canvas").forEach((canvas, k) => {
-    const what = isLobe ? ["Lobe of f cos θ", "turn the lobes"] : ["Lit sphere", "move the light"];
+    const what = isLobe ? ["Lobe of f cos θ", "turn the lobes"] : [`Lit ${state.shape}`, "move the light"];
     canvas.setAttribute("aria-label", `${what[0]}, ${slotLabel(k)}. Arrow keys ${what[1]}.`);
   });
 }
@@ -835,9 +838,9 @@ function begin() {
       state[name] = byId(name).value;
       changedState("slice", ...(name === "channel" ? ["albedo"] : []), ...(name === "scale" && state.view === "lobe" ? ["pictures"] : []));
     });
-  for (const radio of document.querySelectorAll('input[name="view"]'))
+  for (const radio of document.querySelectorAll('input[type="radio"]'))
     radio.addEventListener("change", () => {
-      state.view = radio.value;
+      state[radio.name] = radio.value;
       showOptions();
       changedState("pictures");
     });

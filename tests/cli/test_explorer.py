@@ -115,15 +115,15 @@ found.differences = PAIRS.map((address) => attempt(address, () => {
   drawDifference();
   return {...renderer.difference(state.slots, 0.5, 0), text: byId("difference-text").textContent};
 }));
-/** The mean colour of a picture in another light, and a 1. */
-const brightness = (address, light, samples) => {
-  readAddress(address);
+/** The mean colour of a picture in another light, and how much of the picture the object covers. */
+const brightness = (address, light, samples, at = "-0.4:0.3") => {
+  readAddress(`${address}&lamp=${at}`);
   SAMPLES[light] = samples;
-  const picture = {}, sums = [0, 0, 0, 0];
+  const picture = {}, sums = [0, 0, 0, 0], [slot] = state.slots, lamp = lampDirection(state.lamp);
   for (let i = 0; i < samples; ++i)
-    renderer.addSample(picture, light, state.slots[0], light, 64, lampDirection([-0.4, 0.3]));
+    renderer.addSample(picture, light, slot, light, 64, lamp, state.shape);
   renderer.read(picture.sum).forEach((x, i) => { sums[i % 4] += x; });
-  return sums.map((x) => x / sums[3]);
+  return [...sums.slice(0, 3).map((x) => x / sums[3]), sums[3] / samples / 64 ** 2];
 };
 // The same integral with directions from the cosine alone; and white light from everywhere.
 BRDFC.glsl.plain = BRDFC.glsl.sky
@@ -133,6 +133,13 @@ BRDFC.glsl.furnace = BRDFC.glsl.sky
   .replace("vec3 radiance(vec3 d)\\n{", "$&\\n    return vec3(1.0);");
 found.sky = attempt("sky", () => ["sky", "plain"].map((l) => brightness("#m=microfacet", l, 200)));
 found.furnace = attempt("furnace", () => FURNACE.map((m) => brightness(m, "furnace", 50)));
+found.knot = attempt("knot", () =>
+  FURNACE.map((m) => brightness(`${m}&shape=knot`, "furnace", 50)));
+// A white matte surface lit from the viewer shows the cosine of its normal.
+found.facing = attempt("facing", () => ["sphere", "knot"].map((shape) =>
+  brightness(`#m=lambert,rho=1&shape=${shape}`, "lamp", 16, "0:0")));
+found.shapes = attempt("shapes", () => ["sphere", "knot"].map((shape) =>
+  brightness(`#m=microfacet&shape=${shape}`, "sky", 50)));
 attempt("lobe", () => {
   quality = 1;
   found.lambert = lobeOf("#m=lambert,rho=0.8:0.4:0.2&view=lobe&theta=0&turned=0:0");
@@ -152,7 +159,7 @@ attempt("lobe", () => {
 });
 attempt("address", () => {
   const ward = "m=ward,ax=0.3,ks=0.1:0.2:0.3,normalisation=duer";
-  const address = `#${ward}&m=lambert,rho=0.5&theta=30&view=sky&lamp=0.100:0.200`;
+  const address = `#${ward}&m=lambert,rho=0.5&theta=30&view=sky&shape=knot&lamp=0.100:0.200`;
   found.unread = readAddress(address);
   found.address = [address, addressOf()];
   rebuild();
@@ -415,6 +422,49 @@ def test_the_sky_is_as_bright_by_any_strategy(found):
 def test_no_light_is_lost_in_pictures(found):
     for address, (*color, _) in zip(FURNACE, found["furnace"], strict=True):
         assert color == pytest.approx([1, 1, 1], abs=0.01), address
+
+
+def test_no_light_is_lost_on_the_knot(found):
+    """Nor gained: it does not shadow itself."""
+    for address, (*color, _) in zip(FURNACE, found["knot"], strict=True):
+        assert color == pytest.approx([1, 1, 1], abs=0.01), address
+
+
+def knot():
+    """How much of a picture the knot covers, and the mean cosine of what is seen of it: from
+    points of its surface, by two angles, of which the nearest in each pixel is kept."""
+    a, b = np.meshgrid(np.linspace(0, 2 * np.pi, 2400), np.linspace(0, 2 * np.pi, 500))
+    pixels = 320
+    depth, cosine = np.full((2, pixels * pixels), -np.inf)
+    axes = np.array([[0.9689, 0.2474, 0], [-0.2037, 0.7979, 0.5673], [0.1404, -0.5497, 0.8235]])
+    for strand in (-0.22, 0.22):
+        x, y = strand + 0.19 * np.cos(b), 0.19 * np.sin(b)
+        c, s = np.cos(1.5 * a), np.sin(1.5 * a)
+        radius, height = 0.58 + c * x - s * y, s * x + c * y
+        points = np.stack([radius * np.cos(a), radius * np.sin(a), height], -1) @ axes
+        normals = np.cross(*(np.gradient(points, axis=i) for i in (1, 0)))
+        normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+        at = ((points[..., :2] / 1.04 + 1) / 2 * pixels).astype(int)
+        where = (at[..., 1] * pixels + at[..., 0]).ravel()
+        order = np.argsort(points[..., 2].ravel())
+        order = order[points[..., 2].ravel()[order] > depth[where[order]]]
+        # The last one of a pixel stays: the nearest.
+        depth[where[order]] = points[..., 2].ravel()[order]
+        cosine[where[order]] = abs(normals[..., 2].ravel()[order])
+    seen = np.isfinite(depth)
+    return seen.mean(), cosine[seen].mean()
+
+
+def test_the_knot_has_the_normals_of_its_surface(found):
+    """And the sphere, whose mean cosine is 2/3."""
+    (*sphere, disk), (*shown, covered) = found["facing"]
+    assert sphere == pytest.approx([2 / 3] * 3, abs=0.005)
+    assert disk == pytest.approx(np.pi / 4 / 1.04**2, abs=0.005)
+    cover, cosine = knot()
+    assert covered == pytest.approx(cover, abs=0.012)
+    assert shown == pytest.approx([cosine] * 3, abs=0.006)
+    sphere, shown = (np.array(x[:3]) for x in found["shapes"])
+    assert (shown > 0).all() and (abs(shown / sphere - 1) > 0.02).all()
 
 
 def test_the_lobe_of_lambert_is_a_sphere_on_the_surface(found):
