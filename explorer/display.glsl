@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Shows sums of samples, whose alpha counts those that met the sphere; or the difference of two, in false colours.
+// Shows sums of samples, whose alpha counts those that met an object; or the difference of two, in false colours.
 
 uniform sampler2D sum;
 uniform sampler2D other;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Draws with WebGL 2: pictures of spheres, and numbers about models. Knows nothing of the page.
+// Draws with WebGL 2: pictures of objects, and numbers about models. Knows nothing of the page.
 "use strict";
 
 /** Columns of textures that hold tables, as in library.glsl. */
@@ -105,7 +105,9 @@ class Renderer {
     this.programs = new Map();
     this.tables = new Map();
     gl.disable(gl.DITHER);
-    gl.bindVertexArray(gl.createVertexArray());
+    this.lobes = new Map();
+    this.plain = gl.createVertexArray();
+    gl.bindVertexArray(this.plain);
     this.vertex = this.shader(
       gl.VERTEX_SHADER,
       "#version 300 es\nvoid main() { gl_Position = vec4(gl_VertexID == 1 ? 3 : -1, gl_VertexID == 2 ? 3 : -1, 0, 1); }\n",
@@ -140,12 +142,15 @@ class Renderer {
     ].join("\n");
     const fragment = this.shader(gl.FRAGMENT_SHADER, text);
     const program = gl.createProgram();
-    gl.attachShader(program, this.vertex);
+    const own = BRDFC.glsl[`${name}_vertex`];
+    const vertex = own ? this.shader(gl.VERTEX_SHADER, `#version 300 es\n${own}`) : this.vertex;
+    gl.attachShader(program, vertex);
     gl.attachShader(program, fragment);
     gl.linkProgram(program);
     if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost())
       throw new Error(`${key}: ${gl.getShaderInfoLog(fragment) || gl.getProgramInfoLog(program)}`);
     gl.deleteShader(fragment);
+    if (own) gl.deleteShader(vertex);
     const uniforms = new Map();
     const count = gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS);
     for (let i = 0; i < count; ++i) {
@@ -244,8 +249,8 @@ class Renderer {
     return this.gl.checkFramebufferStatus(this.gl.FRAMEBUFFER) === this.gl.FRAMEBUFFER_COMPLETE;
   }
 
-  /** Runs a program for each pixel of the target, or of the canvas if that is null. */
-  draw(made, target, slots, values) {
+  /** Makes a program the one that draws, with its uniforms, into the target, or into the canvas if that is null. */
+  use(made, target, slots, values) {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target ? target.framebuffer : null);
     gl.viewport(0, 0, target ? target.width : this.canvas.width, target ? target.height : this.canvas.height);
@@ -269,7 +274,12 @@ class Renderer {
       else gl.uniform1i(at, value);
     }
     gl.activeTexture(gl.TEXTURE0);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  /** Runs a program for each pixel of the target, or of the canvas if that is null. */
+  draw(made, target, slots, values) {
+    this.use(made, target, slots, values);
+    this.gl.drawArrays(this.gl.TRIANGLES, 0, 3);
   }
 
   read(target) {
@@ -332,7 +342,7 @@ class Renderer {
   }
 
   /** Adds a sample to the picture of a slot unless that is finished; `picture` is its state, which begins as {}. */
-  addSample(picture, key, slot, view, size, lamp) {
+  addSample(picture, key, slot, view, size, lamp, shape = "sphere") {
     if (picture.samples >= SAMPLES[view]) return;
     const number = picture.samples || 0;
     const needed = view === "lamp" ? ["eval"] : ["eval", "pdf", "sample", "mirror", "transmit", "iors", "inside"];
@@ -345,9 +355,63 @@ class Renderer {
     }
     // The first sample is in the pixel's centre; the others fill the pixel evenly.
     const offset = [((number * 0.7548776662 + 0.5) % 1) - 0.5, ((number * 0.5698402910 + 0.5) % 1) - 0.5];
-    this.draw(made, to, [slot], { sum: from.texture, size: [size, size], offset, lamp, number });
+    this.draw(made, to, [slot], { sum: from.texture, size: [size, size], offset, lamp, number, is_knot: shape === "knot" });
     picture.sum = to;
     picture.samples = number + 1;
+  }
+
+  /** The colours of ideal reflection and refraction of light from a direction, and the index of refraction of green. */
+  shares(slot, from) {
+    const made = this.program("shares", [slot], ["mirror", "transmit", "iors"]);
+    const target = this.target("shares", 3, 1);
+    this.draw(made, target, [slot], { from });
+    const found = Array.from(this.read(target));
+    return { mirror: found.slice(0, 3), transmit: found.slice(4, 7), ior: found[9] };
+  }
+
+  /** Takes the mesh of a lobe, as lobeMesh() makes it, in the place of the one that had this key. */
+  fillLobe(key, mesh) {
+    const { gl } = this;
+    if (!this.lobes.has(key)) {
+      const made = { array: gl.createVertexArray(), vertices: gl.createBuffer(), triangles: gl.createBuffer() };
+      gl.bindVertexArray(made.array);
+      gl.bindBuffer(gl.ARRAY_BUFFER, made.vertices);
+      for (const [at, first, count] of [[0, 0, 3], [1, 3, 3], [2, 6, 4]]) {
+        gl.enableVertexAttribArray(at);
+        gl.vertexAttribPointer(at, count, gl.FLOAT, false, 4 * LOBE_NUMBERS, 4 * first);
+      }
+      this.lobes.set(key, made);
+    }
+    const lobe = this.lobes.get(key);
+    gl.bindVertexArray(lobe.array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, lobe.vertices);
+    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(mesh.vertices), gl.DYNAMIC_DRAW);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, lobe.triangles);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array(mesh.triangles), gl.DYNAMIC_DRAW);
+    gl.bindVertexArray(this.plain);
+    Object.assign(lobe, { opaque: mesh.opaque, count: mesh.triangles.length });
+  }
+
+  /** Shows a lobe, with four pixels for each of the canvas, whose edges are smooth then. */
+  showLobe(canvas, key, view, size) {
+    const { gl } = this, lobe = this.lobes.get(key);
+    if (this.canvas.width !== 2 * size) this.canvas.width = this.canvas.height = 2 * size;
+    if (canvas.width !== size) canvas.width = canvas.height = size;
+    this.use(this.program("lobe", [], []), null, [], view);
+    gl.bindVertexArray(lobe.array);
+    gl.clearColor(0, 0, 0, 0);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.enable(gl.DEPTH_TEST);
+    gl.drawElements(gl.TRIANGLES, lobe.opaque, gl.UNSIGNED_INT, 0);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.drawElements(gl.TRIANGLES, lobe.count - lobe.opaque, gl.UNSIGNED_INT, 4 * lobe.opaque);
+    gl.disable(gl.BLEND);
+    gl.disable(gl.DEPTH_TEST);
+    gl.bindVertexArray(this.plain);
+    const context = canvas.getContext("2d");
+    context.clearRect(0, 0, size, size);
+    context.drawImage(this.canvas, 0, 0, size, size);
   }
 
   /** Copies a picture, or the difference of two, to a 2D canvas. */

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Adds one sample of the sphere under a distant lamp. A white matte surface that faces the lamp shows 1.
+// Adds one sample of the sphere or knot under a distant lamp. A white matte surface that faces the lamp shows 1.
 
 uniform sampler2D sum;
 uniform vec2 size;
@@ -10,7 +10,7 @@ out vec4 color;
 void main()
 {
     color = texelFetch(sum, ivec2(gl_FragCoord.xy), 0);
-    vec4 n = sphere_normal(size, offset);
+    vec4 n = seen_normal(size, offset);
     if (n.w == 0.0)
         return;
     mat3 frame = frame_of(n.xyz);

@@ -90,7 +90,8 @@ const colorOf = (hex) => [1, 3, 5].map((i) => Number(toLinear(parseInt(hex.slice
 // ---- State --------------------------------------------------------------------------------------
 
 const OPTIONS = {
-  view: { default: "lamp", choices: ["lamp", "sky"] },
+  view: { default: "lamp", choices: ["lamp", "sky", "lobe"] },
+  shape: { default: "sphere", choices: ["sphere", "knot"] },
   exposure: { default: 0, min: -4, max: 4 },
   theta: { default: 45, min: 0, max: 89 },
   azimuth: { default: 0, min: 0, max: 180 },
@@ -102,15 +103,17 @@ const OPTIONS = {
 };
 const FIRST_MODELS = ["microfacet", "ward"];
 const FIRST_LAMP = [-0.45, 0.5];
+/** Whence lobes are seen: degrees around the normal, and above the surface. */
+const FIRST_TURNED = [-25, 20];
 
 /** The name of the measured file that a slot shows, if it shows one. */
 const fileOf = (slot) => BRDFC.models[slot.model].file;
 
 /**
  * Everything that a link carries, and files, which it can't. `lamp` is a place on the picture, of which lampDirection()
- * makes a direction.
+ * makes a direction; `turned` is whence lobes are seen.
  */
-const state = { slots: [], lamp: FIRST_LAMP };
+const state = { slots: [], lamp: FIRST_LAMP, turned: FIRST_TURNED };
 
 /** The direction to the lamp: in the picture's centre it is at the viewer, 100 degrees off where the sphere ends. */
 function lampDirection([x, y]) {
@@ -129,6 +132,7 @@ function addressOf() {
   for (const [name, option] of Object.entries(OPTIONS))
     if (state[name] !== option.default) parts.push(`${name}=${state[name]}`);
   if (!same(state.lamp, FIRST_LAMP)) parts.push(`lamp=${state.lamp.map((x) => x.toFixed(3)).join(":")}`);
+  if (!same(state.turned, FIRST_TURNED)) parts.push(`turned=${state.turned.join(":")}`);
   return `#${parts.join("&")}`;
 }
 
@@ -152,6 +156,7 @@ function readAddress(hash) {
   const wrong = [];
   state.slots = [];
   state.lamp = FIRST_LAMP;
+  state.turned = FIRST_TURNED;
   for (const [name, option] of Object.entries(OPTIONS)) state[name] = option.default;
   for (const part of decoded(hash).replace(/^#/, "").split("&").filter(Boolean)) {
     const [name, text = ""] = assignmentOf(part);
@@ -174,6 +179,10 @@ function readAddress(hash) {
       const place = text.split(":").map(numberOf);
       if (place.length === 2 && place.every((x) => Math.abs(x) <= 2)) state.lamp = place;
       else wrong.push(`${part}, expected two numbers from -2 to 2, as in 0.1:0.2`);
+    } else if (name === "turned") {
+      const angles = text.split(":").map(numberOf);
+      if (angles.length === 2 && Math.abs(angles[0]) <= 180 && Math.abs(angles[1]) <= 90) state.turned = angles;
+      else wrong.push(`${part}, expected degrees from -180 to 180 and from -90 to 90, as in -25:20`);
     } else if (Object.hasOwn(OPTIONS, name)) {
       const { choices, min, max } = OPTIONS[name];
       const value = choices ? text : numberOf(text);
@@ -195,7 +204,7 @@ function writeAddress() {
 // ---- Drawing ------------------------------------------------------------------------------------
 
 let renderer;
-/** Pictures by slot: {samples, sum}. */
+/** Pictures by slot: {samples, sum}, or {top} of a lobe. */
 let pictures = [];
 /** What is not up to date. */
 const stale = new Set();
@@ -267,6 +276,30 @@ function pictureSize(canvas) {
   return Math.max(64, Math.min(512, Math.round(wanted)));
 }
 
+/** Shows the lobes, which are made when they have no largest value yet. */
+function drawLobes(canvases, size) {
+  const angles = [radians(state.theta), radians(state.azimuth)], light = direction(-angles[0], angles[1]);
+  const isThrough = (slot) => Boolean(formulasOf(slot).through || formulasOf(slot).transmit);
+  const at = state.scale === "log" ? (x) => Math.max(0, 1 + Math.log10(x) / DECADES) : (x) => x;
+  const [around, above] = state.turned.map(radians), [c, s, d, t] = [Math.cos(around), Math.sin(around), Math.cos(above), Math.sin(above)];
+  const view = { right: [c, s, 0], up: [-s * t, c * t, d], towards: [s * d, -c * d, t], middle: state.slots.some(isThrough) ? 0 : 0.4 };
+  state.slots.forEach((slot, k) => {
+    if (pictures[k].top === undefined) {
+      const points = lobeDirections(...angles, formulasOf(slot).through);
+      const values = renderer.evaluate(slot, points.directions.map(() => light), points.directions);
+      pictures[k].top = lobeTop(points.directions, values);
+      renderer.fillLobe(k, lobeMesh(points, values, pictures[k].top, at, angles, renderer.shares(slot, light)));
+    }
+    renderer.showLobe(canvases[k], k, view, size);
+  });
+  const tops = state.slots.map((_, k) => `${slotLabel(k)} ${pictures[k].top > 0 ? digits(pictures[k].top, 3) : "none"}`);
+  const ideal = labelsOf((f) => f.mirror || f.transmit);
+  byId("samples").textContent =
+    `The radius is f cos θ of the view, on the slice's ${state.scale === "log" ? "logarithmic" : "linear"} scale, for light at ` +
+    `θ = ${state.theta}°, φ = ${state.azimuth}° (orange); the mirror direction is grey. Each column is scaled to its own largest value: ` +
+    `${tops.join(", ")}.` + (ideal ? ` Thick arrows are shares of ideal reflection and refraction (${ideal}); the circle's radius is 1.` : "");
+}
+
 /** Shows the pictures, with another sample if `add`; true if more will follow. */
 function drawPictures(add) {
   let more = false;
@@ -274,9 +307,13 @@ function drawPictures(add) {
   const canvases = document.querySelectorAll("#pictures canvas");
   // All have one size, so that they can be compared pixel by pixel.
   const size = pictureSize(canvases[0]);
+  if (state.view === "lobe") {
+    drawLobes(canvases, size);
+    return false;
+  }
   state.slots.forEach((slot, k) => {
     if (pictures[k].sum && pictures[k].sum.width !== size) pictures[k] = {};
-    if (add || !pictures[k].sum) renderer.addSample(pictures[k], `picture ${k}`, slot, state.view, size, lamp);
+    if (add || !pictures[k].sum) renderer.addSample(pictures[k], `picture ${k}`, slot, state.view, size, lamp, state.shape);
     more = more || pictures[k].samples < SAMPLES[state.view];
     renderer.show(canvases[k], pictures[k], scale);
   });
@@ -284,9 +321,11 @@ function drawPictures(add) {
     renderer.show(byId("difference-picture"), pictures[0], scale * 2, pictures[1]);
   const { samples } = pictures[0];
   const dark = state.view === "lamp" ? labelsOf((f) => !f.eval) : "";
+  const refracting = labelsOf((f) => f.transmit);
   byId("samples").textContent =
     `Samples a pixel: ${samples} of ${SAMPLES[state.view]}.` +
-    (dark ? ` A lamp without a size is not seen in ideal reflection and refraction (${dark}): choose the sky.` : "");
+    (dark ? ` A lamp without a size is not seen in ideal reflection and refraction (${dark}): choose the sky.` : "") +
+    (state.shape === "knot" ? ` The knot casts no shadows on itself, and does not see itself${refracting ? "; it refracts as a ball would" : ""}.` : "");
   return more;
 }
 
@@ -380,7 +419,7 @@ function drawDifference() {
     make("strong", {}, percent(everywhere)),
     `of the light, over all views; ${percent(here)} in the view at θ = ${state.theta}°.`,
     make("p", { class: "note" }, "The integral of |f − g| cos θ over that of f cos θ, with the first model f and the second g."),
-    make("p", { class: "note" }, "In the picture, orange is where the first is brighter, and blue where the second is, both doubled."),
+    make("p", { class: "note", id: "difference-colors", hidden: state.view === "lobe" }, "In the picture, orange is where the first is brighter, and blue where the second is, both doubled."),
   );
 }
 
@@ -599,16 +638,30 @@ function slotCard(slot, k) {
   return card;
 }
 
+/** Turns the lobes by degrees. */
+function turn(around, above) {
+  const [a, b] = state.turned, full = a + around;
+  state.turned = [full - 360 * Math.round(full / 360), Math.min(90, Math.max(-90, b + above))].map((x) => Number(x.toFixed(1)));
+  changedState();
+}
+
 function pictureOf(slot, k) {
-  const canvas = make("canvas", { role: "img", tabindex: 0, "aria-label": `Lit sphere, ${slotLabel(k)}. Arrow keys move the light.`, width: 64, height: 64 });
+  const canvas = make("canvas", { role: "img", tabindex: 0, width: 64, height: 64 });
+  let before = [0, 0];
   const place = (event) => {
     const box = canvas.getBoundingClientRect();
+    if (state.view === "lobe") {
+      turn((180 * (before[0] - event.clientX)) / box.width, (180 * (event.clientY - before[1])) / box.height);
+      before = [event.clientX, event.clientY];
+      return;
+    }
     const at = [((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2];
     state.lamp = at.map((x) => Number(Math.min(1.6, Math.max(-1.6, x)).toFixed(3)));
     changedState("pictures");
   };
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
+    before = [event.clientX, event.clientY];
     place(event);
   });
   canvas.addEventListener("pointermove", (event) => {
@@ -618,6 +671,10 @@ function pictureOf(slot, k) {
     const step = { ArrowLeft: [-0.05, 0], ArrowRight: [0.05, 0], ArrowUp: [0, 0.05], ArrowDown: [0, -0.05] }[event.key];
     if (!step) return;
     event.preventDefault();
+    if (state.view === "lobe") {
+      turn(-100 * step[0], -100 * step[1]);
+      return;
+    }
     state.lamp = state.lamp.map((x, i) => Number(Math.min(1.6, Math.max(-1.6, x + step[i])).toFixed(3)));
     changedState("pictures");
   });
@@ -641,8 +698,15 @@ function showOptions() {
     document.querySelector(`output[for="${name}"]`).textContent = name === "exposure" ? state[name].toFixed(1) : `${state[name]}°`;
   }
   for (const name of ["quantity", "plot", "scale", "channel"]) byId(name).value = state[name];
-  for (const radio of document.querySelectorAll('input[name="view"]')) radio.checked = radio.value === state.view;
-  byId("light-name").textContent = state.view === "lamp" ? "the lamp" : "the sun";
+  for (const radio of document.querySelectorAll('input[type="radio"]')) radio.checked = radio.value === state[radio.name];
+  const isLobe = state.view === "lobe";
+  byId("moved").textContent = { lamp: "move the lamp", sky: "move the sun", lobe: "turn the lobes" }[state.view];
+  byId("spheres-title").textContent = isLobe ? "Lobe" : state.shape === "knot" ? "Knot" : "Sphere";
+  for (const id of ["shapes", "exposure-label", "difference-picture", "difference-colors"]) if (byId(id)) byId(id).hidden = isLobe;
+  document.querySelectorAll("#pictures canvas").forEach((canvas, k) => {
+    const what = isLobe ? ["Lobe of f cos θ", "turn the lobes"] : [`Lit ${state.shape}`, "move the light"];
+    canvas.setAttribute("aria-label", `${what[0]}, ${slotLabel(k)}. Arrow keys ${what[1]}.`);
+  });
 }
 
 /** Makes the controls of models anew, after models were chosen, added or removed. */
@@ -767,16 +831,16 @@ function begin() {
       state[name] = Number(byId(name).value);
       showOptions();
       showRecipes();
-      changedState(...drawn);
+      changedState(...drawn, ...(state.view === "lobe" && drawn.includes("albedo") ? ["pictures"] : []));
     });
   for (const name of ["quantity", "plot", "scale", "channel"])
     byId(name).addEventListener("change", () => {
       state[name] = byId(name).value;
-      changedState("slice", ...(name === "channel" ? ["albedo"] : []));
+      changedState("slice", ...(name === "channel" ? ["albedo"] : []), ...(name === "scale" && state.view === "lobe" ? ["pictures"] : []));
     });
-  for (const radio of document.querySelectorAll('input[name="view"]'))
+  for (const radio of document.querySelectorAll('input[type="radio"]'))
     radio.addEventListener("change", () => {
-      state.view = radio.value;
+      state[radio.name] = radio.value;
       showOptions();
       changedState("pictures");
     });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Adds one sample of the sphere in an environment: sky, sun, softbox and a chequered ground. Directions are drawn from
+// Adds one sample of the sphere or knot in an environment: sky, sun, softbox and a chequered ground. Directions are drawn from
 // the model, the cosine, the sun and the softbox, and weighed by the balance heuristic of multiple importance sampling
 // (E. Veach, L. Guibas: Optimally Combining Sampling Techniques for Monte Carlo Rendering, SIGGRAPH 1995).
 
@@ -53,7 +53,8 @@ vec3 radiance(vec3 d)
 
 #ifdef TRANSMIT_0
 // Light that reaches the viewer through a solid ball of radius 1, from where the ray enters it. Inside, all angles are
-// equal: at each point some light leaves, and the rest goes on.
+// equal: at each point some light leaves, and the rest goes on. A knot's points are taken for those of the ball with the
+// same normal.
 vec3 through_ball(vec3 n, mat3 frame, vec3 wo, float ior)
 {
     vec3 d = refract(-vec3(0, 0, 1), n, 1.0 / ior), share = transmit_0(wo), light = vec3(0.0);
@@ -80,7 +81,7 @@ vec3 through_ball(vec3 n, mat3 frame, vec3 wo, float ior)
 void main()
 {
     color = texelFetch(sum, ivec2(gl_FragCoord.xy), 0);
-    vec4 n = sphere_normal(size, offset);
+    vec4 n = seen_normal(size, offset);
     if (n.w == 0.0)
         return;
     mat3 frame = frame_of(n.xyz);

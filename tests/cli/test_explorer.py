@@ -49,6 +49,40 @@ const attempt = (what, run) => {
   }
 };
 quality = 0.2;  // small pictures
+/** A lobe as it is drawn, and distances of its surface from the origin. */
+const lobeOf = (address) => {
+  const unread = readAddress(address), fill = renderer.fillLobe;
+  let mesh;
+  renderer.fillLobe = (key, made) => fill.call(renderer, key, mesh = made);
+  rebuild();
+  drawPictures(true);
+  renderer.fillLobe = fill;
+  const canvas = document.querySelector("#pictures canvas"), {width} = canvas;
+  const {data} = canvas.getContext("2d").getImageData(0, 0, width, width);
+  const {directions} = lobeDirections(radians(state.theta), radians(state.azimuth),
+    formulasOf(state.slots[0]).through);
+  const count = pictures[0].top > 0 ? directions.length : 0;
+  const radii = directions.slice(0, count).map((d, i) => {
+    const p = mesh.vertices.slice(LOBE_NUMBERS * i, LOBE_NUMBERS * i + 3);
+    return Math.hypot(...p);
+  });
+  // How far each radius is from the cosine.
+  const off = radii.reduce((a, r, i) => Math.max(a, Math.abs(r - Math.abs(directions[i][2]))), 0);
+  const shown = mesh.vertices.filter((_, i) => i >= LOBE_NUMBERS * count && i % LOBE_NUMBERS === 0);
+  return {
+    unread, off, top: pictures[0].top, label: canvas.getAttribute("aria-label"),
+    radius: radii.reduce((a, x) => Math.max(a, x), 0),
+    finite: mesh.vertices.every(Number.isFinite), rods: shown.length,
+    error: renderer.gl.getError(),
+    // Pixels of each row that are no background, and how bright the picture is.
+    rows: Array.from({length: width}, (_, y) => {
+      let n = 0;
+      for (let x = 0; x < width; ++x) n += data[4 * (y * width + x) + 3] > 200;
+      return n;
+    }),
+    light: data.reduce((a, x, i) => a + (i % 4 < 3 ? x : 0), 0),
+  };
+};
 for (const {model, values} of CASES)
   found.values.push(attempt(model, () => {
     const slot = {model, values: {...defaultsOf(model), ...values}};
@@ -66,11 +100,13 @@ for (const model of MODELS)
       const pixels = renderer.read(pictures[0].sum);
       lit[view] = [pixels.reduce((a, x) => a + x, 0), pixels.reduce((a, x) => Math.min(a, x), 0)];
     }
+    const lobe = lobeOf(`#m=${model}&view=lobe&theta=40`);
     drawSlice();
     drawAlbedo();
     const albedo = Array.from(renderer.albedo(state.slots[0], ALBEDO_ANGLES, 0));
     const curves = document.querySelectorAll("#slice .curve, #albedo .curve").length;
-    return {lit, albedo, curves, error: byId("error").hidden ? "" : byId("error").textContent};
+    const error = byId("error").hidden ? "" : byId("error").textContent;
+    return {lit, lobe, albedo, curves, error};
   });
 found.differences = PAIRS.map((address) => attempt(address, () => {
   readAddress(address);
@@ -79,15 +115,15 @@ found.differences = PAIRS.map((address) => attempt(address, () => {
   drawDifference();
   return {...renderer.difference(state.slots, 0.5, 0), text: byId("difference-text").textContent};
 }));
-/** The mean colour of a picture in another light, and a 1. */
-const brightness = (address, light, samples) => {
-  readAddress(address);
+/** The mean colour of a picture in another light, and how much of the picture the object covers. */
+const brightness = (address, light, samples, at = "-0.4:0.3") => {
+  readAddress(`${address}&lamp=${at}`);
   SAMPLES[light] = samples;
-  const picture = {}, sums = [0, 0, 0, 0];
+  const picture = {}, sums = [0, 0, 0, 0], [slot] = state.slots, lamp = lampDirection(state.lamp);
   for (let i = 0; i < samples; ++i)
-    renderer.addSample(picture, light, state.slots[0], light, 64, lampDirection([-0.4, 0.3]));
+    renderer.addSample(picture, light, slot, light, 64, lamp, state.shape);
   renderer.read(picture.sum).forEach((x, i) => { sums[i % 4] += x; });
-  return sums.map((x) => x / sums[3]);
+  return [...sums.slice(0, 3).map((x) => x / sums[3]), sums[3] / samples / 64 ** 2];
 };
 // The same integral with directions from the cosine alone; and white light from everywhere.
 BRDFC.glsl.plain = BRDFC.glsl.sky
@@ -97,9 +133,33 @@ BRDFC.glsl.furnace = BRDFC.glsl.sky
   .replace("vec3 radiance(vec3 d)\\n{", "$&\\n    return vec3(1.0);");
 found.sky = attempt("sky", () => ["sky", "plain"].map((l) => brightness("#m=microfacet", l, 200)));
 found.furnace = attempt("furnace", () => FURNACE.map((m) => brightness(m, "furnace", 50)));
+found.knot = attempt("knot", () =>
+  FURNACE.map((m) => brightness(`${m}&shape=knot`, "furnace", 50)));
+// A white matte surface lit from the viewer shows the cosine of its normal.
+found.facing = attempt("facing", () => ["sphere", "knot"].map((shape) =>
+  brightness(`#m=lambert,rho=1&shape=${shape}`, "lamp", 16, "0:0")));
+found.shapes = attempt("shapes", () => ["sphere", "knot"].map((shape) =>
+  brightness(`#m=microfacet&shape=${shape}`, "sky", 50)));
+attempt("lobe", () => {
+  quality = 1;
+  found.lambert = lobeOf("#m=lambert,rho=0.8:0.4:0.2&view=lobe&theta=0&turned=0:0");
+  found.tilted = lobeOf("#m=lambert&view=lobe&theta=75&azimuth=20");
+  found.logarithmic = lobeOf("#m=lambert&view=lobe&theta=20&scale=log");
+  const address = "#m=lambert&view=lobe&theta=20&turned=30:-10";
+  found.lobe_unread = readAddress(address);
+  rebuild();
+  found.lobe_address = [address, addressOf()];
+  const canvas = document.querySelector("#pictures canvas");
+  for (const key of ["ArrowLeft", "ArrowUp", "ArrowUp"])
+    canvas.dispatchEvent(new KeyboardEvent("keydown", {key, cancelable: true}));
+  found.turned = addressOf();
+  found.hidden = ["exposure-label", "difference-picture"].map((id) => byId(id).hidden);
+  found.lobe_wrong = ["turned=0", "turned=:", "turned=0:91"].map((text) => readAddress(`#${text}`));
+  quality = 0.2;
+});
 attempt("address", () => {
   const ward = "m=ward,ax=0.3,ks=0.1:0.2:0.3,normalisation=duer";
-  const address = `#${ward}&m=lambert,rho=0.5&theta=30&view=sky&lamp=0.100:0.200`;
+  const address = `#${ward}&m=lambert,rho=0.5&theta=30&view=sky&shape=knot&lamp=0.100:0.200`;
   found.unread = readAddress(address);
   found.address = [address, addressOf()];
   rebuild();
@@ -328,6 +388,13 @@ def test_every_model_is_drawn(found, model):
     for view in ("lamp", "sky"):
         total, least = page["lit"][view]
         assert np.isfinite(total) and total > 0 and least >= 0, view
+    lobe = page["lobe"]
+    assert lobe["finite"] and lobe["error"] == 0 and lobe["light"] > 0
+    # The largest value is 1; ideal reflection and refraction are arrows beside the lines.
+    if lobe["top"] > 0:
+        assert lobe["radius"] == pytest.approx(1)
+    else:
+        assert lobe["rods"] > found["lambert"]["rods"]
     got = np.array(page["albedo"]).reshape(-1, 4)[:, :3]
     angles = np.minimum(np.arange(len(got)) / (len(got) - 1) * np.pi / 2, 1.569)
     chosen = [15, 40]
@@ -355,6 +422,78 @@ def test_the_sky_is_as_bright_by_any_strategy(found):
 def test_no_light_is_lost_in_pictures(found):
     for address, (*color, _) in zip(FURNACE, found["furnace"], strict=True):
         assert color == pytest.approx([1, 1, 1], abs=0.01), address
+
+
+def test_no_light_is_lost_on_the_knot(found):
+    """Nor gained: it does not shadow itself."""
+    for address, (*color, _) in zip(FURNACE, found["knot"], strict=True):
+        assert color == pytest.approx([1, 1, 1], abs=0.01), address
+
+
+def knot():
+    """How much of a picture the knot covers, and the mean cosine of what is seen of it: from
+    points of its surface, by two angles, of which the nearest in each pixel is kept."""
+    a, b = np.meshgrid(np.linspace(0, 2 * np.pi, 2400), np.linspace(0, 2 * np.pi, 500))
+    pixels = 320
+    depth, cosine = np.full((2, pixels * pixels), -np.inf)
+    axes = np.array([[0.9689, 0.2474, 0], [-0.2037, 0.7979, 0.5673], [0.1404, -0.5497, 0.8235]])
+    for strand in (-0.22, 0.22):
+        x, y = strand + 0.19 * np.cos(b), 0.19 * np.sin(b)
+        c, s = np.cos(1.5 * a), np.sin(1.5 * a)
+        radius, height = 0.58 + c * x - s * y, s * x + c * y
+        points = np.stack([radius * np.cos(a), radius * np.sin(a), height], -1) @ axes
+        normals = np.cross(*(np.gradient(points, axis=i) for i in (1, 0)))
+        normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+        at = ((points[..., :2] / 1.04 + 1) / 2 * pixels).astype(int)
+        where = (at[..., 1] * pixels + at[..., 0]).ravel()
+        order = np.argsort(points[..., 2].ravel())
+        order = order[points[..., 2].ravel()[order] > depth[where[order]]]
+        # The last one of a pixel stays: the nearest.
+        depth[where[order]] = points[..., 2].ravel()[order]
+        cosine[where[order]] = abs(normals[..., 2].ravel()[order])
+    seen = np.isfinite(depth)
+    return seen.mean(), cosine[seen].mean()
+
+
+def test_the_knot_has_the_normals_of_its_surface(found):
+    """And the sphere, whose mean cosine is 2/3."""
+    (*sphere, disk), (*shown, covered) = found["facing"]
+    assert sphere == pytest.approx([2 / 3] * 3, abs=0.005)
+    assert disk == pytest.approx(np.pi / 4 / 1.04**2, abs=0.005)
+    cover, cosine = knot()
+    assert covered == pytest.approx(cover, abs=0.012)
+    assert shown == pytest.approx([cosine] * 3, abs=0.006)
+    sphere, shown = (np.array(x[:3]) for x in found["shapes"])
+    assert (shown > 0).all() and (abs(shown / sphere - 1) > 0.02).all()
+
+
+def test_the_lobe_of_lambert_is_a_sphere_on_the_surface(found):
+    """As f cos is the cosine: the point at height z is sqrt(z (1 - z)) from the normal."""
+    for name in ("lambert", "tilted"):
+        assert found[name]["off"] < 1e-4, name
+    luminance = 0.2126 * 0.8 + 0.7152 * 0.4 + 0.0722 * 0.2
+    assert found["lambert"]["top"] == pytest.approx(luminance / np.pi, rel=1e-5)
+    # The largest of 1 + log10(c) / 4 - c.
+    assert found["logarithmic"]["off"] == pytest.approx(0.6503, abs=0.005)
+    rows = np.array(found["lambert"]["rows"])
+    pixel = 2 * 1.25 / len(rows)
+    z = 0.4 + (len(rows) / 2 - np.arange(len(rows)) - 0.5) * pixel
+    for low, high, width in [
+        (0.04, 0.96, 2 * np.sqrt(np.clip(z * (1 - z), 0, None))),
+        (1.2, 2, 0 * z),
+        (-2, -0.04, 0 * z),
+    ]:
+        inside = (z > low) & (z < high)
+        assert inside.sum() > 5
+        assert np.abs(rows * pixel - width)[inside].max() < 2.5 * pixel
+    assert found["lambert"]["label"] == "Lobe of f cos θ, Lambert. Arrow keys turn the lobes."
+
+
+def test_a_link_carries_the_lobe_and_whence_it_is_seen(found):
+    given, written = found["lobe_address"]
+    assert found["lobe_unread"] == [] and written == given
+    assert "turned=35:-20" in found["turned"] and found["hidden"] == [True, True]
+    assert [len(wrong) for wrong in found["lobe_wrong"]] == [1, 1, 1]
 
 
 def test_a_link_carries_the_settings(found):

@@ -262,6 +262,24 @@ def test_a_grey_file_looks_like_the_grey_model(browser, files):
     assert browser.run("document.querySelectorAll('#slice .curve, #albedo .curve').length") == 4
 
 
+def test_a_file_has_a_lobe_that_a_mouse_turns(browser, files):
+    browser.run("readAddress('#m=lambert,rho=0.5&view=lobe'); rebuild()")
+    dropped(browser, files / "it's grey.binary")
+    browser.wait_for("stale.size === 0 && pictures.every((p) => p.top > 0)")
+    assert browser.run("pictures.map((p) => p.top)") == pytest.approx(2 * [0.5 / np.pi], rel=1e-4)
+    browser.run("scrollTo(0, 0)")
+    box = browser.run("""(() => {
+      const {left, top, width} = document.querySelector("#pictures canvas").getBoundingClientRect();
+      return [left, top, width];
+    })()""")
+    x, y, width = box
+    for kind, dx in [("mousePressed", 0.5), ("mouseMoved", 0.6), ("mouseReleased", 0.6)]:
+        where = {"x": x + dx * width, "y": y + 0.5 * width}
+        browser.call("Input.dispatchMouseEvent", type=kind, button="left", clickCount=1, **where)
+    assert browser.run("state.turned") == pytest.approx([-25 - 18, 20], abs=0.2)
+    assert browser.console == []
+
+
 BAD = {
     "short.binary": "expected 34992012 bytes, 3 planes of 1458000 doubles after a header of 12 "
     "bytes, got 34992004: truncated?",
