@@ -21,25 +21,24 @@ from . import automatic, choice_sockets, model_nodes, nodes
 _hidden, _own = set(), set()
 
 
-def _dependencies(context, kind):
+def _dependencies(context, kind, copied=None):
     """The blocks of a kind that were imported as dependencies. Those that the user asked for by
-    name must stay, as Blender goes on to use them."""
-    copied = _copied(context)
+    name must stay, as Blender goes on to use them. `copied`: the names of those of a paste."""
+
+    def is_dependency(item):
+        if copied is None:
+            return "INDIRECT_USAGE" in item.import_info
+        return item.name not in copied
+
     return [
         item.id
         for item in context.import_items
         if item.id_type == kind
         and item.append_action == "MAKE_LOCAL"
-        and _is_dependency(item, copied)
+        and is_dependency(item)
         and item.id is not None
         and item.id.library is None
     ]
-
-
-def _is_dependency(item, copied):
-    if copied is not None and item.id_type == "OBJECT":
-        return item.name not in copied
-    return "INDIRECT_USAGE" in item.import_info
 
 
 def _copied(context):
@@ -60,7 +59,8 @@ def _remove_lamps(context, groups):
     if not lists:
         return
     imported = {item.id for item in context.import_items}
-    idle = _only_listed(_dependencies(context, "OBJECT"), lists, imported)
+    objects = _dependencies(context, "OBJECT", _copied(context))
+    idle = _only_listed(objects, lists, imported)
     held = {one.data for one in idle} - {None}
     bpy.data.batch_remove(idle)
     bpy.data.batch_remove([data for data in held if data.users == 0])
@@ -86,6 +86,9 @@ def _leave_out_lamps(scene):
     lamps of linked materials read them. Blender may hold pointers to them while handlers run, so
     they are not removed; without a user they are not saved."""
     global _hidden, _own
+    # This runs at each update of the dependency graph.
+    if not _hidden and not bpy.data.libraries:
+        return
     lists = {group for group in bpy.data.node_groups if lamps.is_group(group)}
     came = _hidden and [one for one in scene.objects if _has_come(one)]
     for one in _only_listed(came, lists) if came else ():

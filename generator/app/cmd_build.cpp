@@ -160,24 +160,27 @@ void require_alone(const Options& options, const char* option) {
     input_error("build: {} DIR goes with --all or --model NAME alone", option);
 }
 
-/// Writes the models as files of BRDF Explorer. All texts are made before the first file is written.
+/// All texts are made before the first file is written.
+template <class Texts> void write_files(const std::filesystem::path& folder, const Texts& texts) {
+  for (const auto& [name, text] : texts) pack::write_text(folder / name, text);
+  fmt::print(stderr, "brdfc build: wrote {} files to {}\n", texts.size(), folder.string());
+}
+
+/// Writes the models as files of BRDF Explorer.
 void write_brdf(const Options& options) {
   require_alone(options, "--brdf");
   std::vector<const Model*> models;
   for (const std::string& name : options.models) models.push_back(&find_model(name));
   if (models.empty()) models = models_named("");
   const pack::BrdfFiles files = pack::brdf_files(models, data_path("explorer") / "library.glsl");
-  for (const auto& [name, text] : files.texts) pack::write_text(std::filesystem::path(options.brdf) / name, text);
   for (const std::string& why : files.left_out) fmt::print(stderr, "brdfc build: without {}\n", why);
-  fmt::print(stderr, "brdfc build: wrote {} files to {}\n", files.texts.size(), options.brdf);
+  write_files(options.brdf, files.texts);
 }
 
-/// Writes the models as OSL that needs no extension. All texts are made before the first file is written.
+/// Writes the models as OSL that needs no extension.
 void write_osl(const Options& options) {
   require_alone(options, "--osl");
-  const auto files = pack::standalone_files(options.models);
-  for (const auto& [name, text] : files) pack::write_text(std::filesystem::path(options.osl) / name, text);
-  fmt::print(stderr, "brdfc build: wrote {} files to {}\n", files.size(), options.osl);
+  write_files(options.osl, pack::standalone_files(options.models));
 }
 
 void run(const Options& options) {

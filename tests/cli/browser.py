@@ -12,22 +12,17 @@ import select
 import subprocess
 import time
 
-FLAGS = (
-    "--headless=new --no-sandbox --disable-dev-shm-usage --no-first-run --hide-scrollbars "
-    "--use-angle=swiftshader --enable-unsafe-swiftshader --remote-debugging-pipe"
-).split()
-
-
-DUMP_FLAGS = (
-    "--headless=new --no-sandbox --disable-dev-shm-usage --no-first-run --enable-logging=stderr "
-    "--use-angle=swiftshader --enable-unsafe-swiftshader --dump-dom"
+_FLAGS = (
+    "--headless=new --no-sandbox --disable-dev-shm-usage --no-first-run "
+    "--use-angle=swiftshader --enable-unsafe-swiftshader"
 ).split()
 
 
 def found_by_page(program, profile, address):
     """The JSON that a page leaves in <pre id="found"> when it has loaded, and what the browser
     reported, by lines."""
-    command = [program, *DUMP_FLAGS, f"--user-data-dir={profile}", address]
+    command = [program, *_FLAGS, "--enable-logging=stderr", "--dump-dom"]
+    command += [f"--user-data-dir={profile}", address]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     found = re.search(r'<pre id="found">(.+?)</pre>', done.stdout, re.S)
     assert found, done.stderr[-2000:]
@@ -43,7 +38,8 @@ class Browser:
         self._read, from_browser = os.pipe()
         # Chromium reads from descriptor 3 and writes to 4.
         shell = f'exec "$@" 3<&{to_browser} 4>&{from_browser}'
-        command = ["bash", "-c", shell, "browser", program, *FLAGS, f"--user-data-dir={profile}"]
+        command = ["bash", "-c", shell, "browser", program, *_FLAGS, "--hide-scrollbars"]
+        command += ["--remote-debugging-pipe", f"--user-data-dir={profile}"]
         self._process = subprocess.Popen(
             [*command, "about:blank"],
             pass_fds=(to_browser, from_browser),
