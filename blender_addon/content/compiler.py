@@ -67,6 +67,19 @@ def _captured_stderr():
             lines += sink.read().decode(errors="replace").splitlines()
 
 
+@contextlib.contextmanager
+def _removed_temporary_files():
+    """Blender's compiler writes each shader to a temporary file that it never deletes
+    (`cycles.osl.osl_compile()`); within this context they lie in a folder that is deleted."""
+    before = tempfile.tempdir
+    with tempfile.TemporaryDirectory(prefix="brdfc_", ignore_cleanup_errors=True) as folder:
+        tempfile.tempdir = folder
+        try:
+            yield
+        finally:
+            tempfile.tempdir = before
+
+
 def compile_script(script_node, text, what):
     """Compiles a text in a script node; `what` names it in messages. Raises CompileError."""
     import cycles.osl
@@ -75,7 +88,7 @@ def compile_script(script_node, text, what):
         raise CompileError(pack.NO_OSL)
     _find_oslquery()
     reports = []
-    with _captured_stderr() as console:
+    with _removed_temporary_files(), _captured_stderr() as console:
         # Under Cycles the assignment already compiles; under other engines it does not.
         script_node.script = text
         if not script_node.bytecode:

@@ -9,6 +9,7 @@ import math
 import re
 import subprocess
 import sys
+import tempfile
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
@@ -463,6 +464,16 @@ def test_broken_shader_is_an_error(extension, empty, monkeypatch, case):
     with pytest.raises(extension.api.CompileError, match=message):
         extension.api.new_material("lambert")
     assert helpers.counts() == before
+
+
+@pytest.mark.parametrize("engine", ["CYCLES", "BLENDER_WORKBENCH"])
+def test_compiled_shaders_leave_no_temporary_files(extension, empty, monkeypatch, tmp_path, engine):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    empty.render.engine = engine
+    extension.api.new_material("lambert")
+    assert [t.name for t in bpy.data.texts]
+    assert [p.name for p in tmp_path.iterdir()] == []
+    assert tempfile.gettempdir() == str(tmp_path)
 
 
 def test_broken_shader_under_another_engine(extension, empty, monkeypatch):
