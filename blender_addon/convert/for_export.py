@@ -164,16 +164,16 @@ def _color_link(material, linked):
         return None
     lights = [nearest_node.light(material, grey) for grey in _GREYS]
     near = lights[1].nearest()
-    for one in (near, near and replace(near, metallic=1.0)):
-        if one is None:
-            continue
-        colors = np.array([light.color_for(one) for light in lights])
+    metal = near and not near.transmission and replace(near, metallic=1.0)
+    for one in filter(None, (near, metal)):
+        nodes = [light.like(one) for light in lights]
+        colors = np.array([node.color for node in nodes])
         # Exporters understand a product, but not a sum.
         product = colors.T @ _GREYS / np.dot(_GREYS, _GREYS), np.zeros(3)
         for slope, offset in (product, np.polyfit(_GREYS, colors, 1)):
             off = np.abs(np.outer(_GREYS, slope) + offset - colors).max()
             if off <= _LINEAR and slope.max() >= _FLAT:
-                return _ColorLink(one, output, slope, offset)
+                return _ColorLink(nodes[1], output, slope, offset)
     return None
 
 

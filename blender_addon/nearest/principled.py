@@ -196,17 +196,20 @@ class Search:
         r, m, index, _ = self._best(self._around(r, step, 25), curve, metallic, every)
         finest = self._around(r, step ** (1 / 12), 9)
         r, m, index, color = self._best(finest, curve, np.array([m]), np.array([index]))
-        color = tuple(float(c) for c in color)
-        native = _native(r, m, float(_IOR[index]), color)
-        found = node_slice(native, self.wi, self.wo)
-        error = misplaced(found, curve, self.area)
-        return Nearest(r, m, float(_IOR[index]), color, found, error)
+        return self._node(curve, r, m, float(_IOR[index]), color)
 
-    def color(self, curve, near):
-        """The base colour with which a Nearest node, whose other inputs stay, fits a curve best."""
+    def like(self, near, curve):
+        """The Nearest node to a curve among those that differ from `near` in the base colour."""
         parts = self._parts(np.array([near.roughness]))
         which = np.array([int(np.argmin(np.abs(_IOR - near.ior)))])
-        return self._best(parts, curve, np.array([near.metallic]), which)[-1]
+        color = self._best(parts, curve, np.array([near.metallic]), which)[-1]
+        return self._node(curve, near.roughness, near.metallic, near.ior, color)
+
+    def _node(self, curve, roughness, metallic, ior, color):
+        color = tuple(float(c) for c in color)
+        found = node_slice(_native(roughness, metallic, ior, color), self.wi, self.wo)
+        error = misplaced(found, curve, self.area)
+        return Nearest(roughness, metallic, ior, color, found, error)
 
 
 @functools.cache
@@ -260,10 +263,15 @@ def _smooth(shares, cosines, through):
     return _smooth_best(shares, cosines, metallic, ior, through)
 
 
-def _smooth_node(curve, search, cosines, shares, here):
-    """The smooth Nearest node; its error is a fraction of all light, from 0 to 2."""
+def _smooth_node(curve, search, cosines, shares, here, near=None):
+    """The smooth Nearest node, or that with the metallic and IOR of `near`; its error is a fraction
+    of all light, from 0 to 2."""
     through = bool(shares.refracted.any())
-    metallic, ior, color = _smooth(shares, cosines, through)
+    if near:
+        given = np.array([near.metallic]), np.array([near.ior])
+        metallic, ior, color = _smooth_best(shares, cosines, *given, through)
+    else:
+        metallic, ior, color = _smooth(shares, cosines, through)
     native = _native(0.0, metallic, ior, tuple(map(float, color)))
     each = search.wo[None]
     mirror = native_bsdf.mirror(native, each)[0]
@@ -287,8 +295,9 @@ FROM_BELOW = np.stack([np.sin(BELOW), 0 * BELOW, -np.cos(BELOW)], -1)
 _FROSTED_ROUGHNESS, _FROSTED_IOR = np.geomspace(1, 0.03, 16), np.linspace(1.05, 2.55, 16)
 
 
-def _frosted(curve, below, search):
-    """The rough Nearest node that transmits; `below`: as in nearest()."""
+def _frosted(curve, below, search, near=None):
+    """The rough Nearest node that transmits, or that with the roughness and IOR of `near`; `below`:
+    as in nearest()."""
     wi = np.concatenate([search.wi, FROM_BELOW])
     area = np.concatenate([search.area, np.gradient(BELOW)])
     wanted, above = np.concatenate([curve, below]), len(search.wi)
@@ -308,28 +317,23 @@ def _frosted(curve, below, search):
     def off(node):
         return float((area @ (found(*node)[1] - wanted) ** 2).sum())
 
-    grid = itertools.product(_FROSTED_ROUGHNESS, _FROSTED_IOR)
-    roughness, ior = min(grid, key=off)
-    for width in (1.0, 0.2):
-        around = (
-            roughness * np.geomspace(1.25, 0.8, 9) ** width,
-            ior + width * np.linspace(-0.1, 0.1, 9),
-        )
-        grid = itertools.product(np.clip(around[0], 0.02, 1), np.maximum(around[1], 1.0))
+    def search_all():
+        grid = itertools.product(_FROSTED_ROUGHNESS, _FROSTED_IOR)
         roughness, ior = min(grid, key=off)
+        for width in (1.0, 0.2):
+            around = (
+                roughness * np.geomspace(1.25, 0.8, 9) ** width,
+                ior + width * np.linspace(-0.1, 0.1, 9),
+            )
+            grid = itertools.product(np.clip(around[0], 0.02, 1), np.maximum(around[1], 1.0))
+            roughness, ior = min(grid, key=off)
+        return roughness, ior
+
+    roughness, ior = (near.roughness, near.ior) if near else search_all()
     tint, node = found(roughness, ior)
     color = tuple(map(float, tint**2))
     error = misplaced(node, wanted, area)
     return Nearest(float(roughness), 0.0, float(ior), color, node[:above], error, True)
-
-
-def color_like(near, curve, angles, incidence, cosines, shares):
-    """The base colour (3,) with which a Nearest node, whose other inputs stay, comes nearest to a
-    material; arguments as those of nearest()."""
-    if near.roughness > 0:
-        return _search(incidence, angles.tobytes()).color(curve, near)
-    given = np.array([near.metallic]), np.array([near.ior])
-    return _smooth_best(shares, cosines, *given, near.transmission)[-1]
 
 
 def nearest(curve, angles, incidence, cosines, shares, here, below):
@@ -338,15 +342,41 @@ def nearest(curve, angles, incidence, cosines, shares, here, below):
     `curve`: f cos (N, 3) of the material at `angles`, in radians, for light from the angle
     -incidence, in degrees. `below`: the same FROM_BELOW. `shares`: its Shares at the view
     `cosines`; `here`: at the angle of incidence."""
-    if below.any():
-        return _frosted(curve, below, _search(incidence, angles.tobytes()))
-    rough = nearest_principled(curve, angles, incidence)
-    ideal = float(here.mirror.sum() + here.refracted.sum())
-    if not ideal > 0:
-        return rough
     search = _search(incidence, angles.tobytes())
-    found = _smooth_node(curve, search, cosines, shares, here)
-    if rough:  # a rough node lacks ideal reflection
-        off = ideal + float(here.scattered.sum()) * rough.error
-        found = min(found, dataclasses.replace(rough, error=off), key=lambda node: node.error)
-    return dataclasses.replace(found, error=found.error / (ideal + float(here.scattered.sum())))
+    if below.any():
+        return _frosted(curve, below, search)
+    rough = nearest_principled(curve, angles, incidence)
+    if not _ideal(here) > 0:
+        return rough
+    found = _of_all_light(_smooth_node(curve, search, cosines, shares, here), here)
+    if rough:
+        rough = _without_mirror(rough, here)
+        found = min(found, rough, key=lambda node: node.error)
+    return found
+
+
+def like(near, curve, angles, incidence, cosines, shares, here, below):
+    """The node Nearest to a material among those that differ from `near`, which nearest() found for
+    a material that differs in its colours, in the base colour; other arguments as those of
+    nearest()."""
+    search = _search(incidence, angles.tobytes())
+    if near.roughness == 0:
+        return _of_all_light(_smooth_node(curve, search, cosines, shares, here, near), here)
+    if near.transmission:
+        return _frosted(curve, below, search, near)
+    return _without_mirror(search.like(near, curve), here)
+
+
+def _ideal(here):
+    return float(here.mirror.sum() + here.refracted.sum())
+
+
+def _of_all_light(node, here):
+    """A smooth node whose error is a fraction of the light from here that is reflected."""
+    return dataclasses.replace(node, error=node.error / (_ideal(here) + here.scattered.sum()))
+
+
+def _without_mirror(node, here):
+    """A rough node beside a material with ideal reflection, all of which it lacks."""
+    off = _ideal(here) + float(here.scattered.sum()) * node.error
+    return dataclasses.replace(node, error=off / (_ideal(here) + float(here.scattered.sum())))

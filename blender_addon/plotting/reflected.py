@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import brdfc
-from ..nearest.principled import FROM_BELOW, Shares, color_like, nearest
+from ..nearest.principled import FROM_BELOW, Shares, like, nearest
 
 #: The angle of the incident light in the plane of incidence, in degrees.
 INCIDENCE = 45.0
@@ -86,13 +86,15 @@ class Reflected:
 
     def nearest(self):
         """The Principled node Nearest to it; None if it reflects nothing."""
-        given = self.shares, self.here, self.below
-        return nearest(self.curve, angles(), INCIDENCE, views(), *given)
+        return nearest(*self._given)
 
-    def color_for(self, near):
-        """The base colour (3,) with which a Nearest node, whose other inputs stay, comes nearest to
-        it."""
-        return color_like(near, self.curve, angles(), INCIDENCE, views(), self.shares)
+    def like(self, near):
+        """The same among nodes that differ from a Nearest one in the base colour."""
+        return like(near, *self._given)
+
+    @property
+    def _given(self):
+        return self.curve, angles(), INCIDENCE, views(), self.shares, self.here, self.below
 
     def __add__(self, other):
         def both(a, b):

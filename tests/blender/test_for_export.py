@@ -142,6 +142,33 @@ def test_links_of_colours_and_normals_stay(extension, empty, make, between, most
     assert _state(material)[1] == before[1]
 
 
+@pytest.mark.parametrize("make", [_tinted, _frosted], ids=["glass", "frosted"])
+def test_tints_of_refraction_are_not_linked(extension, empty, make):
+    """Cycles multiplies refracted light by the root of the base colour, which is not linear."""
+    material = make(extension.api)
+    (node,) = extension.model_nodes.group_nodes(material)
+    color = material.node_tree.nodes.new("ShaderNodeTexNoise").outputs["Color"]
+    material.node_tree.links.new(color, extension.model_nodes.sockets(node)["refracted"])
+    done = extension.api.replace_by_principled(material)
+    assert len(done.lost) == 1
+    assert not _principled(material).inputs["Base Color"].is_linked
+
+
+def test_error_is_that_of_the_node_which_follows_the_colour(extension, empty):
+    """It was that of a node which is nearer, but does not follow it."""
+    material = extension.api.new_material("ashikhmin_shirley")
+    (node,) = extension.model_nodes.group_nodes(material)
+    sockets = extension.model_nodes.sockets(node)
+    color = next(socket for socket in sockets.values() if socket.type == "RGBA")
+    color.default_value = (0.5, 0.5, 0.5, 1)
+    near = extension.api.nearest_principled(material)
+    texture = material.node_tree.nodes.new("ShaderNodeTexNoise").outputs["Color"]
+    material.node_tree.links.new(texture, color)
+    done = extension.api.replace_by_principled(material)
+    assert _principled(material).inputs["Base Color"].is_linked
+    assert done.error > near["error"]
+
+
 def test_links_that_have_no_input_are_named(extension, empty):
     material = extension.api.new_material("modified_phong")
     (node,) = extension.model_nodes.group_nodes(material)
