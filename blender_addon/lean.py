@@ -211,11 +211,23 @@ class Baking(Job):
         for name, node in found.items():
             if (has := model_nodes.uses_albedo(node)) != albedo[name]:
                 groups[name] = self._group(self._plan.materials[name], has, before)
-        for name, node in found.items():
-            nodes.replace_group(node, groups[name])
+        self._put({node: groups[name] for name, node in found.items()})
         nodes.remove_unused_groups()
         self._afterwards()
         self.result = sum(map(model_nodes.is_baked, dict.fromkeys(found.values())))
+
+    def _put(self, groups):
+        """Puts all groups into their nodes, or none. A node keeps its own group if another shader
+        reads an output that the lean one lacks: Albedo, which Formula Nodes take from the twin."""
+        before = {node: node.node_tree for node in groups}
+        try:
+            for node, group in groups.items():
+                if nodes.has_linked_outputs(node, group):
+                    nodes.replace_group(node, group)
+        except BaseException:
+            for node, group in before.items():
+                nodes.replace_group(node, group)
+            raise
 
     def _group(self, entry, albedo, before):
         with _taken(self._plan.pack):

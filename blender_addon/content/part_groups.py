@@ -117,7 +117,8 @@ def make_group(title, content, inputs, outputs, fill, kept=False):
     if group := _find(digest) or (_appended(digest) if kept else None):
         return group
     with _wait_cursor() if kept else contextlib.nullcontext():
-        group = _filled(f"brdfc {title}", inputs, outputs, fill)
+        # Names that begin with a dot are not in Blender's menus and searches.
+        group = _filled(f".brdfc {title}", inputs, outputs, fill)
     group[PART] = digest
     if kept:
         kept_groups.keep(group, digest)

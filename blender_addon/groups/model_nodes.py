@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import bpy
 
+from .. import lamps
 from ..common import editable
 from ..common.i18n import say
 from ..content import stand_in
@@ -112,6 +113,16 @@ def content_group(group):
         inner = (n.node_tree for n in group.nodes if is_ours(n))
         return next((g for g in inner if g[TAG]["representation"] == form), group)
     return group
+
+
+def lamps_of_library(node):
+    """The shared group that a node of a linked material reads its lamps from; None if it is this
+    file's own."""
+    tree = node.node_tree
+    if tree.library is None:
+        return None
+    inner = (getattr(n, "node_tree", None) for n in content_group(tree).nodes)
+    return next((g for g in inner if g is not None and lamps.is_group(g)), None)
 
 
 def is_baked(node):

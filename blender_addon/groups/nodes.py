@@ -170,7 +170,8 @@ def is_at_work():
 
 
 def _title(model_name, parts):
-    return f"{pack.model(model_name).label} ({', '.join(parts)})"
+    """Begins with a dot: Blender leaves such groups out of menus and searches."""
+    return f".{pack.model(model_name).label} ({', '.join(parts)})"
 
 
 @contextlib.contextmanager
@@ -445,6 +446,13 @@ def add_albedo(node):
         _exchange(node, _ensure_automatic(model.forms[tag[AUTO]], albedo=True))
         return
     _exchange(node, ensure_group(*model_nodes.identity(node), albedo=True))
+
+
+def has_linked_outputs(node, group):
+    """Whether a group has all outputs of a node that are linked."""
+    items = group.interface.items_tree
+    names = {i.name for i in items if i.item_type == "SOCKET" and i.in_out == "OUTPUT"}
+    return names >= {output.name for output in node.outputs if output.is_linked}
 
 
 def replace_group(node, group):

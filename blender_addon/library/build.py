@@ -14,6 +14,7 @@ import os
 import sys
 from pathlib import Path
 
+import _cycles
 import bpy
 
 AUTHOR = "brdfc contributors"
@@ -56,8 +57,16 @@ def make(library, preview, api, entry):
 
 
 def make_all(folder, library, preview, api):
-    found = library.entries()
-    write(folder / library.BLEND, {make(library, preview, api, entry) for entry in found})
+    found, materials = library.entries(), set()
+    can_compile = _cycles.with_osl
+    for entry in found:
+        try:
+            materials.add(make(library, preview, api, entry))
+        except api.CompileError as error:
+            if can_compile:
+                raise
+            print(f"brdfc: left out {entry.name}: {error}", flush=True)
+    write(folder / library.BLEND, materials)
     (folder / library.CATALOGS).write_text(library.catalogs_text(found), encoding="utf-8")
     (folder / library.STAMP).write_text(json.dumps(library.stamp()) + "\n", encoding="utf-8")
 

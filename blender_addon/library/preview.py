@@ -111,7 +111,12 @@ def make_scene(size, samples):
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.cycles.samples, scene.cycles.use_adaptive_sampling = samples, False
-    scene.cycles.use_denoising, scene.cycles.denoiser = True, "OPENIMAGEDENOISE"
+    try:
+        scene.cycles.denoiser = "OPENIMAGEDENOISE"
+    except TypeError:  # Debian's Blender is built without it
+        scene.cycles.use_denoising = False
+    else:
+        scene.cycles.use_denoising = True
     scene.cycles.seed = 1
     scene.render.resolution_x = scene.render.resolution_y = size
     scene.view_settings.view_transform = "Standard"

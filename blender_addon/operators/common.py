@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shared by operators: how they report errors, and which material they act on."""
 
+import bpy
+
 from ..common import editable
 from ..common.i18n import Sentence, iface, of_error, rpt, say, tip
 from ..warnings import checks
@@ -43,9 +45,25 @@ def keeps_changes(operator, *blocks):
     return why is None
 
 
+#: Events with which users look around.
+_NAVIGATION = frozenset(
+    "MOUSEMOVE INBETWEEN_MOUSEMOVE MIDDLEMOUSE WHEELUPMOUSE WHEELDOWNMOUSE TRACKPADPAN "
+    "TRACKPADZOOM MOUSEROTATE NDOF_MOTION".split()
+)
+
+
+def _show_status(context, text):
+    """Shows a text in the status bars of all windows: that of the Preferences has none."""
+    for window in context.window_manager.windows:
+        with context.temp_override(window=window):
+            context.workspace.status_text_set(text)
+
+
 class ModalJob:
-    """An operator whose work is a jobs.Job. It runs while the interface, which shows its progress,
-    stays usable; Esc cancels it, and then nothing is changed."""
+    """An operator whose work is a jobs.Job. The interface shows its progress. Users can navigate,
+    but not change anything under the job; Esc cancels it, and then nothing is changed."""
+
+    job = None
 
     def begin(self, context, job):
         self.job = job
@@ -59,7 +77,7 @@ class ModalJob:
     def show_progress(self, context, share):
         context.window_manager.progress_update(100 * share)
         said = say("{work}: {share}   Esc: cancel", work=self.work(), share=f"{share:.0%}")
-        context.workspace.status_text_set(iface(said))
+        _show_status(context, iface(said))
 
     def work(self):
         return Sentence(self.bl_label)
@@ -70,6 +88,8 @@ class ModalJob:
             said = say("{work}: cancelled, nothing is changed", work=self.work())
             self.report({"INFO"}, rpt(said))
             return {"CANCELLED"}
+        if event.type in _NAVIGATION:
+            return {"PASS_THROUGH"}
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
         try:
@@ -77,6 +97,9 @@ class ModalJob:
         except ERRORS as error:
             self.cancel(context)
             return refused(self, error)
+        except BaseException:
+            self.cancel(context)
+            raise
         if share is None:
             self.end(context)
             return self.finish(context, self.job.result)
@@ -84,11 +107,50 @@ class ModalJob:
         return {"RUNNING_MODAL"}
 
     def cancel(self, context):
-        """Blender calls this, too, when a window closes or a file is opened."""
-        self.job.cancel()
-        self.end(context)
+        """Blender calls this, too, when a window closes, a file is opened, or a file browser that
+        the operator has opened is cancelled."""
+        if self.job is not None:
+            self.job.cancel()
+            self.end(context)
 
     def end(self, context):
         context.window_manager.event_timer_remove(self.timer)
         context.window_manager.progress_end()
-        context.workspace.status_text_set(None)
+        _show_status(context, None)
+
+
+class ModalJobOnPath(ModalJob):
+    """A ModalJob that asks for a file or a folder, if `path`, the name of that property, is empty.
+    start() returns the job for it."""
+
+    #: A job for the next run: an operator that its file browser executes can't become modal.
+    _started = None
+
+    def invoke(self, context, event):
+        if not getattr(self, self.path):
+            context.window_manager.fileselect_add(self)
+            self.browsed = True
+            return {"RUNNING_MODAL"}
+        job, type(self)._started = type(self)._started, None
+        try:
+            return self.begin(context, job or self.start())
+        except ERRORS as error:
+            return refused(self, error)
+
+    def begin_browsed(self):
+        """For execute(): the result if the file browser has called it, otherwise None."""
+        if not getattr(self, "browsed", False):
+            return None
+        cls = type(self)
+        try:
+            cls._started = self.start()
+        except ERRORS as error:
+            return refused(self, error)
+        try:
+            category, name = cls.__name__.split("_OT_")
+            operator = getattr(getattr(bpy.ops, category.lower()), name)
+            return operator("INVOKE_DEFAULT", **{self.path: getattr(self, self.path)})
+        finally:
+            if cls._started is not None:  # refused
+                cls._started.cancel()
+                cls._started = None

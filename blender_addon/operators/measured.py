@@ -14,7 +14,7 @@ from ..measured import ENDINGS, SUM
 from ..packs import pack
 from ..panels.labels import wrapped
 from .adding import BRDFC_OT_new_material
-from .common import ERRORS, ModalJob, refused, report_osl
+from .common import ERRORS, ModalJobOnPath, refused, report_osl
 
 #: The file that a library of measured materials is written to.
 MEASURED_BLEND = "measured.blend"
@@ -33,7 +33,7 @@ def _assign(operator, context, found, model=None):
     report_osl(operator, model_nodes.group_nodes(material), context.scene)
 
 
-class BRDFC_OT_new_measured_material(ModalJob, Operator):
+class BRDFC_OT_new_measured_material(ModalJobOnPath, Operator):
     bl_idname = "brdfc.new_measured_material"
     bl_label = "New Measured Material..."
     bl_description = (
@@ -57,27 +57,22 @@ class BRDFC_OT_new_measured_material(ModalJob, Operator):
     def poll(cls, context):
         return BRDFC_OT_new_material.poll.__func__(cls, context)
 
-    def invoke(self, context, event):
-        if not self.filepath:
-            context.window_manager.fileselect_add(self)
-            self.browsed = True
-            return {"RUNNING_MODAL"}
-        try:
-            return self.begin(context, api.start_measured_fits(self.filepath))
-        except ERRORS as error:
-            return refused(self, error)
+    path = "filepath"
+
+    def start(self):
+        return api.start_measured_fits(self.filepath)
 
     def work(self):
         return say("Fitting models to {file}", file=Path(self.filepath).name)
 
     def finish(self, context, found):
-        BRDFC_OT_choose_measured.found = found
+        BRDFC_OT_choose_measured.show(found)
         bpy.ops.brdfc.choose_measured("INVOKE_DEFAULT")
         return {"CANCELLED"}  # nothing has changed yet, so there is no undo step
 
     def execute(self, context):
-        if getattr(self, "browsed", False):
-            return bpy.ops.brdfc.new_measured_material("INVOKE_DEFAULT", filepath=self.filepath)
+        if (result := self.begin_browsed()) is not None:
+            return result
         try:
             _assign(self, context, api.measured_fits(self.filepath))
         except ERRORS as error:
@@ -85,7 +80,7 @@ class BRDFC_OT_new_measured_material(ModalJob, Operator):
         return {"FINISHED"}
 
 
-class BRDFC_OT_new_measured_library(ModalJob, Operator):
+class BRDFC_OT_new_measured_library(ModalJobOnPath, Operator):
     bl_idname = "brdfc.new_measured_library"
     bl_label = "New Measured Library..."
     bl_description = (
@@ -102,15 +97,10 @@ class BRDFC_OT_new_measured_library(ModalJob, Operator):
     )
     filter_folder: BoolProperty(default=True, options={"HIDDEN"})
 
-    def invoke(self, context, event):
-        if not self.directory:
-            context.window_manager.fileselect_add(self)
-            self.browsed = True
-            return {"RUNNING_MODAL"}
-        try:
-            return self.begin(context, api.start_measured_library(*self._paths()))
-        except ERRORS as error:
-            return refused(self, error)
+    path = "directory"
+
+    def start(self):
+        return api.start_measured_library(*self._paths())
 
     def _paths(self):
         return self.directory, Path(self.directory) / MEASURED_BLEND
@@ -138,21 +128,16 @@ class BRDFC_OT_new_measured_library(ModalJob, Operator):
         return {"FINISHED"}
 
     def execute(self, context):
-        if getattr(self, "browsed", False):
-            return bpy.ops.brdfc.new_measured_library("INVOKE_DEFAULT", directory=self.directory)
+        if (result := self.begin_browsed()) is not None:
+            return result
         try:
             return self.finish(context, api.new_measured_library(*self._paths()))
         except ERRORS as error:
             return refused(self, error)
 
 
-#: Keeps the texts alive: Blender holds no reference to the items of a dynamic list.
-_listed = []
-
-
-def _fits_as_items(_operator, _context):
-    fits = BRDFC_OT_choose_measured.found.fits if BRDFC_OT_choose_measured.found else ()
-    _listed[:] = [
+def _fits_as_items(found):
+    items = [
         (
             fit.model,
             iface(
@@ -164,11 +149,11 @@ def _fits_as_items(_operator, _context):
             ),
             pack.model(fit.model).doc,
         )
-        for fit in fits[:OFFERED]
+        for fit in found.fits[:OFFERED]
     ]
-    if fits and BRDFC_OT_choose_measured.found.sums:
-        _listed.append(_sum_as_item(BRDFC_OT_choose_measured.found.lobe_sum()))
-    return _listed
+    if items and found.sums:
+        items.append(_sum_as_item(found.lobe_sum()))
+    return items
 
 
 def _sum_as_item(found):
@@ -187,10 +172,19 @@ class BRDFC_OT_choose_measured(Operator):
     bl_description = "Choose one of the models that are nearest to a measured BRDF"
     bl_options = {"INTERNAL", "UNDO"}
 
-    found = None  # class attribute, which brdfc.new_measured_material sets
+    found = None
+    #: Blender holds no reference to the texts of these, and asks for them at each redraw.
+    offered = ()
+
+    @classmethod
+    def show(cls, found):
+        """Chooses what the dialog shows next."""
+        cls.found, cls.offered = found, _fits_as_items(found)
 
     model: EnumProperty(
-        name="Model", description="The model that the material has", items=_fits_as_items
+        name="Model",
+        description="The model that the material has",
+        items=lambda _operator, _context: BRDFC_OT_choose_measured.offered,
     )
 
     @classmethod

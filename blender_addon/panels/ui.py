@@ -252,6 +252,14 @@ def draw_node(layout, node, scene):
         layout.operator("brdfc.kernel", icon="FCURVE").node = model_nodes.key(node)
 
 
+def _lamps_seen_by(material, scene):
+    """[slots.Lamp] as a material's nodes see them; one that is linked has the lamps of its file."""
+    for node in model_nodes.group_nodes(material):
+        if group := model_nodes.lamps_of_library(node):
+            return lamps.last_found(scene, group)
+    return lamps.last_found(scene)
+
+
 def draw_lamps(layout, material, scene):
     """Shows the lamps that the material's models aim at, if any of them does."""
     forms = [
@@ -263,7 +271,7 @@ def draw_lamps(layout, material, scene):
     if slots == 0:
         return
     box = layout.box()
-    found = lamps.last_found(scene)
+    found = _lamps_seen_by(material, scene)
     taken = [iface(lamp.name) for lamp in found if lamp.slot is not None and lamp.slot <= slots]
     if taken:
         said = say("Free of noise under {lamps}", lamps=", ".join(taken))
@@ -271,7 +279,7 @@ def draw_lamps(layout, material, scene):
         said = say("Free of noise under no lamp yet")
     wrapped(box.column(align=True), said, "LIGHT")
     limit = closure_slots.lamps_that_fit()
-    if limit is not None and limit[0] < slots:
+    if limit is not None and limit[0] < min(slots, len(found)):
         room, largest = limit
         said = say(
             "Cycles has room for {count} lamps beside the shaders of {material}",

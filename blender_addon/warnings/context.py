@@ -156,13 +156,7 @@ class NodeContext:
 
     @cached_property
     def _others_lamps(self):
-        """The shared group that a node of a linked material reads its lamps from; None if it is
-        this file's own."""
-        tree = self.node.node_tree
-        if tree.library is None:
-            return None
-        inner = (getattr(n, "node_tree", None) for n in model_nodes.content_group(tree).nodes)
-        return next((g for g in inner if g is not None and lamps.is_group(g)), None)
+        return model_nodes.lamps_of_library(self.node)
 
     @cached_property
     def elsewhere(self):

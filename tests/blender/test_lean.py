@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lean materials, baked from inside Blender with the program brdfc."""
 
+import contextlib
 import os
 import sysconfig
 import time
@@ -331,11 +332,13 @@ def manager():
         progress_update=lambda share: told.append(share),
         progress_end=lambda: told.append("end"),
         modal_handler_add=lambda operator: told.append("modal"),
+        windows=["window"],
     )
     context = SimpleNamespace(
         window_manager=window_manager,
         window=None,
         workspace=SimpleNamespace(status_text_set=lambda text: told.append(text)),
+        temp_override=lambda window: contextlib.nullcontext(),
     )
     return SimpleNamespace(context=context, told=told)
 
@@ -385,6 +388,7 @@ def test_esc_while_planning_ends_the_program_and_leaves_no_file(
     assert 25.0 in manager.told, "the share is what the program says"
     # Other events are blocked: what the user changed meanwhile would not be in the plan.
     assert stand.modal(manager.context, SimpleNamespace(type="A")) == {"RUNNING_MODAL"}
+    assert stand.modal(manager.context, SimpleNamespace(type="MIDDLEMOUSE")) == {"PASS_THROUGH"}
     assert stand.modal(manager.context, SimpleNamespace(type="ESC")) == {"CANCELLED"}
     assert "nothing is changed" in stand.reports[0]
     assert job._process.poll() is not None
@@ -422,6 +426,58 @@ def test_a_failure_beside_the_interface_is_said_and_changes_nothing(
     assert stand.reports == ["brdfc: no such thing", "The program brdfc made no plan"]
     assert counts() == before
     assert manager.told[-3:] == ["no timer", "end", None]
+
+
+def test_a_fault_beside_the_interface_ends_the_job(extension, used, manager):
+    """The timer and the status text stayed."""
+    ended = []
+
+    def step():
+        raise KeyError("as if the job had a fault")
+
+    job = SimpleNamespace(step=step, cancel=lambda: ended.append("cancel"))
+    stand = Stand(extension.operators.BRDFC_OT_bake)
+    stand.begin(manager.context, job)
+    with pytest.raises(KeyError):
+        stand.modal(manager.context, SimpleNamespace(type="TIMER"))
+    assert ended == ["cancel"] and manager.told[-3:] == ["no timer", "end", None]
+
+
+@pytest.mark.parametrize("osl", [False, True], ids=["nodes", "osl"])
+def test_a_material_whose_albedo_is_read(extension, empty, kept_program, monkeypatch, osl):
+    """A coat reads it. Lean Formula Nodes lack it, and baking took the groups of all materials."""
+    monkeypatch.setenv("BRDFC_TOOL", str(kept_program))
+    empty.cycles.shading_system = osl
+    coated, other = extension.api.new_material("lambert"), extension.api.new_material("ward")
+    extension.api.add_coat(coated)
+    ball = helpers.add_sphere(empty, coated)
+    ball.data.materials.append(other)
+    before = {n: n.node_tree for m in (coated, other) for n in extension.model_nodes.group_nodes(m)}
+    assert extension.api.bake(extension.api.plan()) == (3 if osl else 2)
+    for node, group in before.items():
+        linked = any(o.name == "Albedo" and o.is_linked for o in node.outputs)
+        assert extension.model_nodes.is_baked(node) == (osl or not linked)
+        assert (node.node_tree == group) == (linked and not osl)
+
+
+def test_a_fault_while_groups_are_put_in_place_restores_all(
+    extension, used, kept_program, monkeypatch
+):
+    plan, before = extension.api.plan(), counts()
+    groups = {name: the_node(extension, m).node_tree for name, m in used.items()}
+    replace, calls = extension.nodes.replace_group, []
+
+    def fail_second(node, group):
+        calls.append(group)
+        if len(calls) == 2:
+            raise KeyError("as if an output were missing")
+        replace(node, group)
+
+    monkeypatch.setattr(extension.nodes, "replace_group", fail_second)
+    with pytest.raises(KeyError):
+        extension.api.bake(plan)
+    assert {name: the_node(extension, m).node_tree for name, m in used.items()} == groups
+    assert counts() == before
 
 
 def test_without_a_plan_there_is_none_to_show_or_to_bake(extension, empty):

@@ -310,9 +310,9 @@ def test_dragging_brings_nothing_twice_and_finds_the_lamps(
     assert found == once, "what was dragged once is not brought again"
     groups, texts, _ = once
     made_of = [
-        f"{model} ({form})" for model in ("Ashikhmin-Shirley", "Ward") for form in FORMS[osl]
+        f".{model} ({form})" for model in ("Ashikhmin-Shirley", "Ward") for form in FORMS[osl]
     ]
-    ours = {n for n in groups if not n.startswith("brdfc ") or n == "brdfc Lamps"}
+    ours = {n for n in groups if not n.startswith(".brdfc ") or n == "brdfc Lamps"}
     assert ours >= {*made_of, "brdfc Lamps"}
     used = {n for n in ours if bpy.data.node_groups[n].users}
     assert {re.sub(r"\.\d+$", "", n) for n in used} == {*made_of, "brdfc Lamps"}
@@ -341,9 +341,9 @@ def test_what_is_asked_for_by_name_stays(extension, made, empty):
     """The user, or a script, may be using a group that was appended by name."""
     extension.api.new_material("ward")
     with bpy.data.libraries.load(str(made.blend)) as (there, here):
-        here.node_groups = [name for name in there.node_groups if name == "Ward (auto)"]
+        here.node_groups = [name for name in there.node_groups if name == ".Ward (auto)"]
     (group,) = here.node_groups
-    assert group.name == "Ward (auto).001" and extension.model_nodes.TAG in group
+    assert group.name == ".Ward (auto).001" and extension.model_nodes.TAG in group
 
 
 @LIBRARY

@@ -460,9 +460,47 @@ def test_the_dialog_and_the_message_say_it(extension, empty, monkeypatch, wide, 
     # Without a dialog, too.
     monkeypatch.setattr(extension.api, "measured_fits", lambda path: brushed)
     reports = []
-    told = SimpleNamespace(filepath="x", report=lambda kind, text: reports.append(text))
+    told = SimpleNamespace(
+        filepath="x",
+        report=lambda kind, text: reports.append(text),
+        begin_browsed=lambda: None,
+    )
     assert operators.BRDFC_OT_new_measured_material.execute(told, bpy.context) == {"FINISHED"}
     assert str(said) in reports
+
+
+def test_the_dialogs_list_keeps_its_texts(extension, empty, wide):
+    """Blender holds no reference to them: new ones at each redraw were shown as garbage."""
+    operator = import_module(f"{extension.package}.operators.measured").BRDFC_OT_choose_measured
+    try:
+        operator.show(wide)
+        items = operator.__annotations__["model"].keywords["items"]
+        first, again = (items(None, bpy.context) for _ in range(2))
+        assert first and all(a is b for a, b in zip(first, again, strict=True))
+        assert wide.fits[0].model == first[0][0]
+    finally:
+        operator.found, operator.offered = None, ()
+
+
+@pytest.mark.parametrize("name", ["new_measured_material", "new_measured_library"])
+def test_a_browsed_file_that_fails_is_a_sentence(extension, empty, monkeypatch, tmp_path, name):
+    """It was a traceback, as was to cancel the file browser."""
+    module = import_module(f"{extension.package}.operators.measured")
+    operator = getattr(module, f"BRDFC_OT_{name}")
+    monkeypatch.setenv("BRDFC_TOOL", str(tmp_path / "none"))
+    reports = []
+
+    stand = SimpleNamespace(
+        browsed=True, report=lambda *said: reports.append(said), path=operator.path
+    )
+    for method in ("start", "_paths", "begin_browsed"):
+        if found := getattr(operator, method, None):
+            setattr(stand, method, found.__get__(stand))
+    stand.filepath, stand.directory = str(tmp_path / "x.csv"), str(tmp_path)
+    assert operator.execute(stand, bpy.context) == {"CANCELLED"}
+    assert reports[-1][0] == {"ERROR"}
+    stand.job = operator.job
+    operator.cancel(stand, bpy.context)
 
 
 @pytest.mark.parametrize(

@@ -795,8 +795,8 @@ def test_a_group_a_model_and_none_that_is_left(extension, empty):
         extension.api.switch_representation(material, "aimed")
     assert not [g for g in bpy.data.node_groups if extension.nodes.part_groups.PART in g]
     assert sorted(g.name for g in bpy.data.node_groups if "Phong" in g.name) == [
-        "Phong (aimed)",
-        "Phong (twin)",
+        ".Phong (aimed)",
+        ".Phong (twin)",
     ]
 
 
