@@ -229,6 +229,17 @@ TEST(Disney, HasPartsThatAreOtherModels) {
   }
 }
 
+TEST(Minnaert, DarkensTheRimByAPowerOfTheCosine) {
+  for (const auto& [k, value] : {std::pair{"k=0.5", 0.5}, {"k=0.8", 0.8}, {"k=1", 1.}, {"k=3", 3.}, {"k=9", 9.}}) {
+    const measure::BoundModel b = bound("minnaert", {"rho=0.6", k});
+    for (const double c : {1., 0.7, 0.1, 0.01}) expect_albedo(b, c, 0.6 * std::pow(c, value - 1));
+  }
+  // Lit from the viewer, a ball is evenly bright with 1/2: a full moon.
+  const measure::BoundModel moon = bound("minnaert", {"rho=0.6", "k=0.5"});
+  for (const double c : {1., 0.5, 0.1, 0.001})
+    EXPECT_NEAR(moon.brdf->eval(direction(c, 0.3), direction(c, 0.3)).g * c, 0.45 / kPi, 1e-12) << c;
+}
+
 TEST(Hapke, WithoutSurgeAndMultipleScatteringIsLommelAndSeeligersLaw) {
   const measure::BoundModel b = bound("hapke", {"w=0.6", "b=0", "b0=0", "scattering=single"});
   for (const double c : {1., 0.5, 0.1, 0.01}) {

@@ -55,6 +55,28 @@ def lambert_pdf(p, wi, wo):
     return vec(wi)[2] / mp.pi
 
 
+# ---- Minnaert 1941 -----------------------------------------------------------------------------
+
+
+def minnaert_f(p, wi, wo):
+    k = mp.mpf(p["k"])
+    darker = (vec(wi)[2] * vec(wo)[2]) ** (k - 1)
+    return [c * (k + 1) / (2 * mp.pi) * darker for c in p["rho"]]
+
+
+def minnaert_pdf(p, wi, wo):
+    k = mp.mpf(p["k"])
+    return (k + 1) / (2 * mp.pi) * vec(wi)[2] ** k
+
+
+def minnaert_albedo(p, cos_o):
+    """f depends on no azimuth. The cosine is x^2: its root is steep at the horizon."""
+    k, cos_o = mp.mpf(p["k"]), mp.mpf(cos_o)
+    scale = (k + 1) * cos_o ** (k - 1)
+    all_light = mp.quad(lambda x: scale * (x * x) ** k * 2 * x, mp.linspace(0, 1, 9))
+    return [c * all_light for c in p["rho"]]
+
+
 # ---- Ashikhmin and Shirley, eqs. 5, 10, 11, 12, 14, 15; eq. 18 inverted ------------------------
 
 
@@ -1881,6 +1903,14 @@ MODELS = {
         defaults={"rho": (0.8, 0.8, 0.8)},
         cases=[{"rho": (1, 1, 1)}, {"rho": (0.2, 0.5, 0.9)}],
         cosines=[1, 0.3],
+    ),
+    "minnaert": dict(
+        f=minnaert_f,
+        pdf=minnaert_pdf,
+        albedo=minnaert_albedo,
+        defaults={"rho": (0.8, 0.8, 0.8), "k": 1.5},
+        cases=[{}, {"k": 0.5, "rho": (1, 1, 1)}, {"k": 0.7, "rho": (0.2, 0.5, 0.9)}, {"k": 9}],
+        cosines=[1, 0.3, 0.05],
     ),
     "ashikhmin_shirley": dict(
         f=as_f,
