@@ -4,18 +4,23 @@
 // M. Minnaert: The Reciprocity Principle in Lunar Photometry, Astrophysical Journal 93, 1941. With the cosines of the
 // directions to the light and to the viewer,
 //   f = rho (k + 1) / (2 pi) (cos theta_i cos theta_o)^(k - 1),
-// reciprocal, and so scaled that rho is the albedo seen from above. The albedo is rho (cos theta_o)^(k - 1).
+// reciprocal, and so scaled that rho is the albedo seen from above. The albedo is rho (cos theta_o)^(k - 1). Lambert's
+// law is k = 1. Published fits to moons and planets mostly have k from 0.5, where a ball that is lit from the viewer is
+// evenly bright, as the full moon is, to 1.
 //
-// Energy. For k >= 1 no light is gained. Published fits to moons and planets mostly have k from 0.5, where a ball that
-// is lit from the viewer is evenly bright, as the full moon is, to 1; Lambert's law is k = 1. For k < 1 the albedo is
-// unbounded at the rim, and above 1 where cos theta_o is below rho^(1 / (1 - k)): with the moon's rho = 0.12 and k =
-// 0.6, within 0.3 degrees of the horizon. A ball in even light is finite nevertheless, and so is the variance of its
-// pixels: it reflects 2 rho / (k + 1) of all light, for k = 0.5 a third more than rho. In a hollow ball each reflection
-// has the factor rho (k + 1) / (2 k), so that white walls with k = 0.5 would multiply light by 1.5. Below k = 0.5 even
-// a lamp near the viewer would make the rim unboundedly bright, so such k are not accepted. Above 10 all
-// but the middle of a ball is black, in single precision even exactly.
+// The rim. For k < 1 that f is unbounded at the horizon. The fits hold some degrees above it, and where interpolated
+// normals turn away from the viewer, single pixels of an outline would be white. So for k < 1 the square of each cosine
+// is here c^2 + (1 - c^2) cos^2 theta with c = 0.05: f is within 3 % of the law where both directions are up to 78
+// degrees from the normal, the albedo seen from above is rho but for 0.9 %, and the rim is at most 0.05^(k - 1) times
+// as bright as the middle.
 //
-// Sampling is exact, by a power of the cosine: the weight depends on the view alone.
+// Energy. For k >= 1 no light is gained. For k < 1 the albedo exceeds 1 where cos theta_o is below rho^(1 / (1 - k)):
+// with rho = 0.12 and k = 0.6, about the moon's, nowhere. A ball in even light reflects nearly 2 rho / (k + 1) of it,
+// for k = 0.5 a third more than rho; and in a hollow ball each reflection has the factor rho (k + 1) / (2 k), or a
+// little less: white walls with k = 0.5 multiply light by 1.43. Below k = 0.5 even a lamp near the viewer would make
+// the rim brighter than the middle. Above 10 all but the middle of a ball is black, in single precision even exactly.
+//
+// Sampling by a power of the cosine is exact for k >= 1: the weight depends on the view alone.
 #include "model/power_lobe.h"
 #include "model/sampling.h"
 #include "model/under.h"
@@ -26,16 +31,18 @@ template <class T> struct Minnaert {
   Rgb<T> rho;
   T k;
 
+  static constexpr double kLeast = 0.05;
+
   static ModelInfo info() {
     return {.name = "minnaert",
             .label = "Minnaert",
             .look = Look::Matte,
             .paper = "M. Minnaert: The Reciprocity Principle in Lunar Photometry, Astrophysical Journal 93, 1941",
-            .equations = "f = rho (k + 1) / (2 pi) (cos theta_i cos theta_o)^(k - 1)",
+            .equations = "f = rho (k + 1) / (2 pi) (cos theta_i cos theta_o)^(k - 1), bounded at the horizon for k < 1",
             .doc =
                 "Moons and planets by one number: below 1 the rim is brighter than that of a matte ball, above 1 "
                 "darker.",
-            .properties = {.conserving = false, .diffuse_limit = "k=1"},
+            .properties = {.conserving = false, .exact_sampling = false, .diffuse_limit = "k=1"},
             .params = {}};
   }
 
@@ -48,12 +55,16 @@ template <class T> struct Minnaert {
 
   /// f at normal incidence, seen from above, over rho.
   T top() const { return (k + T(1)) / (T(2) * pi<T>()); }
-  /// The albedo over rho.
-  T seen(const Vec3<T>& wo) const { return named("seen", pow(maximum(wo.z, tiny<T>()), k - T(1))); }
+  T least2() const { return select(k < T(1), T(kLeast * kLeast), T(0)); }
+  /// The square of the cosine, bounded from below for k < 1.
+  T bounded2(const T& cosTheta) const { return maximum(least2() + (T(1) - least2()) * sqr(cosTheta), tiny<T>()); }
+  T power(const T& cos2) const { return pow(cos2, (k - T(1)) / T(2)); }
+  /// The albedo over rho, but for the bound on the light's cosine.
+  T seen(const Vec3<T>& wo) const { return named("seen", power(bounded2(wo.z))); }
 
   Rgb<T> eval(const Vec3<T>& wi, const Vec3<T>& wo) const {
-    const T both = named("both", maximum(wi.z * wo.z, tiny<T>()));
-    return select(above(wi, wo), rho * (top() * pow(both, k - T(1))), Rgb<T>(T(0)));
+    const T both = named("both", bounded2(wi.z) * bounded2(wo.z));
+    return select(above(wi, wo), rho * (top() * power(both)), Rgb<T>(T(0)));
   }
 
   T pdf(const Vec3<T>& wi, const Vec3<T>& wo) const {
@@ -62,7 +73,9 @@ template <class T> struct Minnaert {
 
   Sample<T> sample(const Vec3<T>& wo, const Vec3<T>& u) const {
     const Vec3<T> wi = sample_power_lobe(k, u.y, u.z);
-    return sample_if(above(wi, wo), wi, rho * seen(wo), pdf(wi, wo));
+    // bounded2() over cos^2.
+    const T beyond = named("beyond", T(1) - least2() + least2() / maximum(sqr(wi.z), tiny<T>()));
+    return sample_if(above(wi, wo), wi, rho * (seen(wo) * power(beyond)), pdf(wi, wo));
   }
 
   /// f cos(theta_i) is a function of the view times one of the light's cosine: a ramp is all of it but for the curve
@@ -73,7 +86,7 @@ template <class T> struct Minnaert {
     T rest = T(double(kRampSize - 1)) / (k + T(1));
     ramp.ramp[0] = Rgb<T>(T(0));
     for (int i = 1; i < kRampSize - 1; ++i) {
-      const T height = pow(T(i / double(kRampSize - 1)), k);
+      const T c(i / double(kRampSize - 1)), height = c * power(bounded2(c));
       ramp.ramp[std::size_t(i)] = Rgb<T>(scale * height);
       rest = rest - height;
     }

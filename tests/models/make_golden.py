@@ -58,9 +58,14 @@ def lambert_pdf(p, wi, wo):
 # ---- Minnaert 1941 -----------------------------------------------------------------------------
 
 
+def minnaert_cos(p, cos):
+    """The cosine, for k < 1 bounded from below by 1 / 20."""
+    return mp.sqrt(cos**2 + (1 - cos**2) / 400) if p["k"] < 1 else cos
+
+
 def minnaert_f(p, wi, wo):
     k = mp.mpf(p["k"])
-    darker = (vec(wi)[2] * vec(wo)[2]) ** (k - 1)
+    darker = (minnaert_cos(p, vec(wi)[2]) * minnaert_cos(p, vec(wo)[2])) ** (k - 1)
     return [c * (k + 1) / (2 * mp.pi) * darker for c in p["rho"]]
 
 
@@ -70,11 +75,9 @@ def minnaert_pdf(p, wi, wo):
 
 
 def minnaert_albedo(p, cos_o):
-    """f depends on no azimuth. The cosine is x^2: its root is steep at the horizon."""
-    k, cos_o = mp.mpf(p["k"]), mp.mpf(cos_o)
-    scale = (k + 1) * cos_o ** (k - 1)
-    all_light = mp.quad(lambda x: scale * (x * x) ** k * 2 * x, mp.linspace(0, 1, 9))
-    return [c * all_light for c in p["rho"]]
+    k, seen = mp.mpf(p["k"]), minnaert_cos(p, mp.mpf(cos_o))
+    half = mp.quad(lambda c: c * minnaert_cos(p, c) ** (k - 1), [0, 0.02, 0.05, 0.1, 0.3, 1])
+    return [c * (k + 1) * seen ** (k - 1) * half for c in p["rho"]]
 
 
 # ---- Ashikhmin and Shirley, eqs. 5, 10, 11, 12, 14, 15; eq. 18 inverted ------------------------
