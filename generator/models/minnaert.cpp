@@ -18,7 +18,7 @@
 // with rho = 0.12 and k = 0.6, about the moon's, nowhere. A ball in even light reflects nearly 2 rho / (k + 1) of it,
 // for k = 0.5 a third more than rho; and in a hollow ball each reflection has the factor rho (k + 1) / (2 k), or a
 // little less: white walls with k = 0.5 multiply light by 1.43. Below k = 0.5 even a lamp near the viewer would make
-// the rim brighter than the middle. Above 10 all but the middle of a ball is black, in single precision even exactly.
+// the rim brighter than the middle. Above k = 10 all but the middle of a ball is black.
 //
 // Sampling by a power of the cosine is exact for k >= 1: the weight depends on the view alone.
 #include "model/power_lobe.h"
