@@ -57,8 +57,12 @@ def strip(folder, scene, out):
 
 def has_one_direction(scene):
     """Whether each pixel of the reference picture uses the same sample, which is no noise that the
-    pixel test could compare with: Suffern shows patterns of a single sample."""
-    settings = json.loads((SCENES / f"{scene}.json").read_text(encoding="utf-8"))["settings"]
+    pixel test could compare with: Suffern shows patterns of a single sample. Scenes of the models'
+    pages are none of scenes/, and have many samples."""
+    file = SCENES / f"{scene}.json"
+    if not file.is_file():
+        return False
+    settings = json.loads(file.read_text(encoding="utf-8"))["settings"]
     return settings["spp"] == 1 and settings.get("pattern") in ("regular", "hammersley")
 
 

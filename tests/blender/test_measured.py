@@ -75,7 +75,7 @@ def test_what_a_file_holds(paint, found):
     assert ward.parameters["ax"] == pytest.approx(0.25, rel=0.02)
     assert ward.parameters["ks"] == pytest.approx((0.2, 0.1, 0.05), rel=0.03)
     with pytest.raises(ValueError, match="Expected one of the models"):
-        found.fit("minnaert")
+        found.fit("lunar_lambert")
 
 
 @FITS

@@ -75,6 +75,8 @@ CASES = [
     pytest.param("edwards", {}, marks=SLOW),
     pytest.param("kelemen", {"f0": (0.2, 0.1, 0.05)}, marks=SLOW),
     pytest.param("lafortune", {}, marks=SLOW),
+    pytest.param("minnaert", {"rho": (0.9, 0.5, 0.2)}, marks=SLOW),
+    pytest.param("minnaert", {"rho": (0.5, 0.4, 0.3), "k": 0.6}, marks=SLOW),
     pytest.param("disney_diffuse", {"rho": (0.9, 0.5, 0.2), "r": 0.8}, marks=SLOW),
     pytest.param("eon", {"rho": (0.9, 0.5, 0.2), "r": 0.8}, marks=SLOW),
     # What Blender's Metallic BSDF does not have.

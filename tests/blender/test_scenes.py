@@ -373,7 +373,7 @@ def test_a_matte_floor_needs_no_shader(extension, empty, scene_file, monkeypatch
     materials = {"white": {"model": "lambert", "parameters": {"rho": [0.2, 0.5, 0.8]}}}
     path = scene_file(lights=sun, materials=materials)
     before = render(extension.scene_loader.load_scene(path))
-    monkeypatch.setattr(extension.pack, "model_names", lambda: ["minnaert"])
+    monkeypatch.setattr(extension.pack, "model_names", lambda: ["mine"])
     scene = extension.scene_loader.load_scene(path)
     (material,) = {s.material for o in scene.objects for s in o.material_slots}
     assert not extension.model_nodes.group_nodes(material)
@@ -386,7 +386,7 @@ def test_a_matte_floor_needs_no_shader(extension, empty, scene_file, monkeypatch
         with pytest.raises(ValueError, match=message):
             extension.scene_loader.load_scene(path)
     path = scene_file(materials={"white": {"model": "phong"}})
-    with pytest.raises(ValueError, match="expected one of minnaert.*brdfc build --scene makes"):
+    with pytest.raises(ValueError, match="expected one of mine.*brdfc build --scene makes"):
         extension.scene_loader.load_scene(path)
 
 

@@ -229,6 +229,38 @@ TEST(Disney, HasPartsThatAreOtherModels) {
   }
 }
 
+TEST(Minnaert, DarkensTheRimByAPowerOfTheCosine) {
+  for (const auto& [k, value] : {std::pair{"k=1", 1.}, {"k=1.3", 1.3}, {"k=3", 3.}, {"k=9", 9.}}) {
+    const measure::BoundModel b = bound("minnaert", {"rho=0.6", k});
+    for (const double c : {1., 0.7, 0.1, 0.01}) expect_albedo(b, c, 0.6 * std::pow(c, value - 1));
+  }
+}
+
+TEST(Minnaert, BrightensTheRimLikewiseAndWithinABound) {
+  const measure::BoundModel moon = bound("minnaert", {"rho=0.6", "k=0.5"});
+  const auto opposite = [&](double c) { return moon.brdf->eval(direction(c, 0.3), direction(c, 0.3)).g * c; };
+  for (const double c : {1., 0.7, 0.3}) {
+    const double of_law = 0.6 * std::pow(c, -0.5);
+    EXPECT_NEAR(albedo_at(moon, c), of_law, 0.016 * of_law) << c;
+    EXPECT_LT(albedo_at(moon, c), of_law) << c;
+    // Lit from the viewer, a ball is evenly bright: a full moon.
+    EXPECT_NEAR(opposite(c), 0.45 / kPi, 0.02 * 0.45 / kPi) << c;
+  }
+  EXPECT_NEAR(opposite(0.2), 0.45 / kPi, 0.03 * 0.45 / kPi);
+  EXPECT_NEAR(albedo_at(moon, 1), 0.6, 0.0055);  // seen from above
+  EXPECT_LT(albedo_at(moon, 1e-4), 0.6 * std::sqrt(20));
+  EXPECT_GT(albedo_at(moon, 1e-4), 0.59 * std::sqrt(20));
+  // A hollow ball: each direction meets the wall at the angle at which it left it.
+  double factor = 0;
+  const int n = 20000;
+  const measure::BoundModel white = bound("minnaert", {"rho=1", "k=0.5"});
+  for (int i = 0; i < n; ++i) {
+    const double c = (i + 0.5) / n;
+    factor += 2 * kPi * white.brdf->eval(direction(c, 0), direction(c, 1)).g * c / n;
+  }
+  EXPECT_NEAR(factor, 1.43, 0.005);
+}
+
 TEST(Hapke, WithoutSurgeAndMultipleScatteringIsLommelAndSeeligersLaw) {
   const measure::BoundModel b = bound("hapke", {"w=0.6", "b=0", "b0=0", "scattering=single"});
   for (const double c : {1., 0.5, 0.1, 0.01}) {

@@ -55,6 +55,31 @@ def lambert_pdf(p, wi, wo):
     return vec(wi)[2] / mp.pi
 
 
+# ---- Minnaert 1941 -----------------------------------------------------------------------------
+
+
+def minnaert_cos(p, cos):
+    """The cosine, for k < 1 bounded from below by 1 / 20."""
+    return mp.sqrt(cos**2 + (1 - cos**2) / 400) if p["k"] < 1 else cos
+
+
+def minnaert_f(p, wi, wo):
+    k = mp.mpf(p["k"])
+    darker = (minnaert_cos(p, vec(wi)[2]) * minnaert_cos(p, vec(wo)[2])) ** (k - 1)
+    return [c * (k + 1) / (2 * mp.pi) * darker for c in p["rho"]]
+
+
+def minnaert_pdf(p, wi, wo):
+    k = mp.mpf(p["k"])
+    return (k + 1) / (2 * mp.pi) * vec(wi)[2] ** k
+
+
+def minnaert_albedo(p, cos_o):
+    k, seen = mp.mpf(p["k"]), minnaert_cos(p, mp.mpf(cos_o))
+    half = mp.quad(lambda c: c * minnaert_cos(p, c) ** (k - 1), [0, 0.02, 0.05, 0.1, 0.3, 1])
+    return [c * (k + 1) * seen ** (k - 1) * half for c in p["rho"]]
+
+
 # ---- Ashikhmin and Shirley, eqs. 5, 10, 11, 12, 14, 15; eq. 18 inverted ------------------------
 
 
@@ -1881,6 +1906,14 @@ MODELS = {
         defaults={"rho": (0.8, 0.8, 0.8)},
         cases=[{"rho": (1, 1, 1)}, {"rho": (0.2, 0.5, 0.9)}],
         cosines=[1, 0.3],
+    ),
+    "minnaert": dict(
+        f=minnaert_f,
+        pdf=minnaert_pdf,
+        albedo=minnaert_albedo,
+        defaults={"rho": (0.8, 0.8, 0.8), "k": 1.5},
+        cases=[{}, {"k": 0.5, "rho": (1, 1, 1)}, {"k": 0.7, "rho": (0.2, 0.5, 0.9)}, {"k": 9}],
+        cosines=[1, 0.3, 0.05],
     ),
     "ashikhmin_shirley": dict(
         f=as_f,

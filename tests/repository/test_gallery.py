@@ -96,6 +96,12 @@ def test_a_page_a_paper(tmp_path, monkeypatch):
         assert max(range(3), key=lambda c: colour[c]) == i, "Blender, reference, difference"
 
 
+def test_the_pixel_test_is_told_of_a_model_s_balls():
+    """Their scene is made for the page: it is none of scenes/."""
+    cells = gallery_pages.measured(scene("ball-shiny", True))[-1]
+    assert "the same within noise: 99.87 % of pixels accepted" in cells
+
+
 NUMBER = {"kind": "number", "label": "Sharpness", "doc": "Of the lobe"}
 MODEL = {
     "name": "shiny",
