@@ -306,7 +306,7 @@ def write_sheet(demos, file):
         shown = [(demo.folder / "data.png", demo.file.name, "the data")]
         for name, title in FITS.items():
             models = " + ".join(model for model, _ in text_of(demo.materials[name]))
-            off = f"{title.lower()}, {percent(demo.misplaced[name])} misplaced"
+            off = f"{title.lower()}, error {percent(demo.misplaced[name])}"
             shown.append((demo.picture(name, False).with_suffix(".png"), models, off))
         for place, (picture, first, second) in zip(row, shown, strict=True):
             place.axis("off")
@@ -353,7 +353,7 @@ def print_fits(demo):
     print(f"    {demo.file.name}: {demo.kind}")
     for name, title in FITS.items():
         off, seconds = percent(demo.misplaced[name]), demo.seconds[name]
-        print(f"      {title.lower():<16} misplaces {off:>7} of the light, after {seconds:4.1f} s")
+        print(f"      {title.lower():<16} error {off:>7}, after {seconds:4.1f} s")
         for model, values in text_of(demo.materials[name], 8):
             print(f"        {model:<20} {values}")
     sys.stdout.flush()

@@ -25,6 +25,17 @@ class _Curves:
         return self.wiring.curve(self.cos_theta, rows[0])
 
 
+#: The custom property of the images below.
+TABLE = "brdfc_table"
+
+
+def restore_tables():
+    """Undoes what was painted on tables: Texture Paint offers them, as all images of materials."""
+    for image in bpy.data.images:
+        if image.library is None and TABLE in image and image.is_dirty:
+            image.reload()
+
+
 class Picture:
     """Tables with several rows: a data image with the rows above one another and red, green and
     blue side by side, which every engine interpolates linearly between pixels."""
@@ -45,6 +56,7 @@ class Picture:
         self.image.alpha_mode = "NONE"
         self.image.pixels.foreach_set(pixels.ravel())
         self.image.pack()
+        self.image[TABLE] = True
         # From the centre of the first pixel to the centre of the last.
         self.u = wiring.math("MULTIPLY_ADD", cos_theta, (width - 1) / width, 0.5 / width)
         self.count, self.height = count, height

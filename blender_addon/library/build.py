@@ -14,7 +14,6 @@ import os
 import sys
 from pathlib import Path
 
-import _cycles
 import bpy
 
 AUTHOR = "brdfc contributors"
@@ -57,13 +56,14 @@ def make(library, preview, api, entry):
 
 
 def make_all(folder, library, preview, api):
+    import _cycles  # found once bpy is imported
+
     found, materials = library.entries(), set()
-    can_compile = _cycles.with_osl
     for entry in found:
         try:
             materials.add(make(library, preview, api, entry))
         except api.CompileError as error:
-            if can_compile:
+            if _cycles.with_osl:
                 raise
             print(f"brdfc: left out {entry.name}: {error}", flush=True)
     write(folder / library.BLEND, materials)

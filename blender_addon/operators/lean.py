@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Operators that make shaders for the open file alone."""
 
+from pathlib import Path
+
 import bpy
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 from bpy.types import Operator
@@ -27,6 +29,8 @@ class BRDFC_OT_write_materials(Operator):
     check_existing: BoolProperty(default=True, options={"HIDDEN"})
 
     def invoke(self, context, event):
+        # A default would not be proposed.
+        self.filepath = str(Path(bpy.data.filepath or "untitled").with_suffix(".json"))
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 

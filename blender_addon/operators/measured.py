@@ -119,8 +119,8 @@ class BRDFC_OT_new_measured_library(ModalJobOnPath, Operator):
             )
             self.report({"INFO"}, rpt(said))
         said = say(
-            "{file} has {count} materials: name its folder in Preferences > File Paths > Asset "
-            "Libraries to see them in the Asset Browser",
+            "{file} has {count} materials: add its folder to the asset libraries in the "
+            "Preferences to see them in the Asset Browser",
             file=made.blend.name,
             count=len(made.materials),
         )

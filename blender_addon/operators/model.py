@@ -11,7 +11,7 @@ from .. import api
 from ..common import color, editable
 from ..common.i18n import Sentence, iface, of_error, rpt, say, tip
 from ..groups import model_nodes, nodes
-from ..packs import kernel, optical
+from ..packs import kernel, optical, pack
 from ..panels.labels import wrapped
 from ..panels.methods import METHODS
 from .common import ERRORS, ChangesActiveMaterial, OfActiveMaterial, refused
@@ -309,6 +309,9 @@ class BRDFC_OT_substance(ChangesActiveMaterial, Operator):
         for note in optical.find(name).notes:
             self.report({"INFO"}, note)
         space = color.working_space()
-        said = say("Set in {space}: {names}", space=space, names=", ".join(values))
+        chosen = node or model_nodes.group_nodes(material)[0]  # the only one
+        parameters = pack.model(model_nodes.identity(chosen).model).parameters
+        labels = [parameters[name]["label"] for name in values]
+        said = say("Set in {space}: {names}", space=space, names=", ".join(labels))
         self.report({"INFO"}, rpt(said))
         return {"FINISHED"}

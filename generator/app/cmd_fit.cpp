@@ -27,7 +27,7 @@ void print_errors(const std::vector<fit::ViewError>& errors, const std::string& 
   const auto quantile = [&](double q) { return in_percent(l1[std::size_t(std::ceil(q * double(l1.size()))) - 1]); };
   fmt::print(
       stderr,
-      "{}: fraction of the light that is misplaced, over views: median {} %, 95th percentile {} %, at most {} %\n",
+      "{}: error by view, the fraction of the light reflected in other directions: median {} %, 95th percentile {} %, at most {} %\n",
       label, quantile(0.5), quantile(0.95), quantile(1));
   CsvWriter out((axis.empty() ? "" : axis + ",") + "cos_theta_o,relative_l1,relative_l2,albedo,negative");
   for (const fit::ViewError& e : errors) {

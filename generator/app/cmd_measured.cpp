@@ -75,7 +75,7 @@ void print_sums(const std::vector<measured::LobeSum>& sums, int asked) {
     fmt::print("\n  black: there is nothing of which lobes could be a sum\n");
     return;
   }
-  fmt::print("\n  {:>5}{:>12}  {:>6}  lobes\n", "lobes", "misplaced", "time");
+  fmt::print("\n  {:>5}{:>12}  {:>6}  lobes\n", "lobes", "error", "time");
   for (const measured::LobeSum& sum : sums) {
     std::vector<std::string> names;
     for (const measured::Lobe& lobe : sum.lobes) names.push_back(lobe.model->info().name);
@@ -212,7 +212,7 @@ void add_measured_command(Command app) {
                  view.albedo.g, view.albedo.b);
     for (const auto* sentences : {&m.notes, &found.sentences})
       for (const std::string& sentence : *sentences) fmt::print("  {}\n", sentence);
-    if (!fits.empty()) fmt::print("\n  {:<22}{:>10}  {:>6}  parameters\n", "model", "misplaced", "time");
+    if (!fits.empty()) fmt::print("\n  {:<22}{:>10}  {:>6}  parameters\n", "model", "error", "time");
     for (const measured::ModelFit& f : fits)
       fmt::print("  {:<22}{:>8.2f} %  {:>4.1f} s  {}{}\n", f.model->info().name, 100 * f.error, f.seconds,
                  format_values(f.model->info(), measured::rounded(f.values)),

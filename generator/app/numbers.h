@@ -46,8 +46,9 @@ N accepted_number(const std::string& option, std::string_view text, const Accept
   if (!finite || !(*number >= range.low && *number <= range.high) || (range.above_low && *number == range.low)) {
     const bool too_long =
         std::integral<N> && !number && text.find_first_not_of("0123456789") == text.npos && !text.empty();
-    refuse(option, fmt::format("expected {}{}, got '{}'", range.text(),
-                               too_long ? fmt::format(", at most {}", range.high) : "", text));
+    const std::string most = fmt::format("{}", range.high), expected = range.text();
+    refuse(option, fmt::format("expected {}{}, got '{}'", expected,
+                               too_long && expected.find(most) == expected.npos ? ", at most " + most : "", text));
   }
   return *number;
 }

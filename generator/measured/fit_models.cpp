@@ -297,7 +297,7 @@ std::optional<std::string> order_of_fits(const std::vector<ModelFit>& fits) {
       if (percent(fits[i].error) < percent(fits[k].error))
         (has_mirror(fits[i]) && distance(fits[i]) > distance(fits[k]) ? mirrors : parameters) = true;
   std::vector<const char*> why;
-  if (mirrors) why.push_back("the order counts the light of a mirror as misplaced, which the column does not");
+  if (mirrors) why.push_back("the order counts the light of a mirror as an error, which the column does not");
   if (parameters) why.push_back("of models that come about as close, those with fewer parameters stand first");
   if (why.empty()) return std::nullopt;
   return fmt::to_string(fmt::join(why, "; "));

@@ -20,7 +20,7 @@ const std::set<std::string>& python_arguments() {
 std::optional<std::string> reserved_for_parameters(const std::string& name) {
   if (is_osl_word(name) || osl_function_words().count(name)) return "OSL or the generator";
   if (is_python_word(name)) return "Python";
-  if (python_arguments().count(name)) return "the functions in Python that take parameters by name";
+  if (python_arguments().count(name)) return "a function in Python that takes parameters by name";
   return std::nullopt;
 }
 

@@ -214,9 +214,8 @@ class MaterialReader {
       resolved = {{"measured", sha256(content.str())}};
       return;
     }
-    const auto misplaces = [&](const std::string& what, double error, const std::string& values) {
-      files_.note(
-          fmt::format("{}: {} misplaces {} % of the light: {}", measurement.file, what, in_percent(error), values));
+    const auto note_error = [&](const std::string& what, double error, const std::string& values) {
+      files_.note(fmt::format("{}: {}, error {} %: {}", measurement.file, what, in_percent(error), values));
     };
     if (name == "lobes") {
       const auto most = m.find("lobes");
@@ -227,7 +226,7 @@ class MaterialReader {
       std::vector<std::string> each;
       for (const measured::Lobe& lobe : sum.lobes)
         each.push_back(lobe.model->info().name + " " + described(lobe.model->info(), lobe.values));
-      misplaces("a sum of " + measured::counted(sum.lobes.size(), "lobe", "lobes"), sum.error,
+      note_error("a sum of " + measured::counted(sum.lobes.size(), "lobe", "lobes"), sum.error,
                 fmt::format("{}", fmt::join(each, " + ")));
       if (const auto said = measured::gain_of_sum(sum.brightest)) files_.note(measurement.file + ": " + *said);
       set_stack(sum.lobes, measured::Stack::Sum, material, resolved);
@@ -244,12 +243,12 @@ class MaterialReader {
     if (fit.matte) {
       const Model& lambert = find_model("lambert");
       const ParamValues rho{{"rho", std::array<double, 3>{fit.matte->r, fit.matte->g, fit.matte->b}}};
-      misplaces(info.name + " with lambert", fit.error,
+      note_error(info.name + " with lambert", fit.error,
                 described(info, fit.values) + " + " + described(lambert.info(), rho) + measured::remarks(fit));
       set_stack({{fit.model, fit.values}, {&lambert, rho}}, measured::Stack::Sum, material, resolved);
       return;
     }
-    misplaces(info.name, fit.error, described(info, fit.values) + measured::remarks(fit));
+    note_error(info.name, fit.error, described(info, fit.values) + measured::remarks(fit));
     material.model = fit.model;
     material.values = fit.values;
     resolved = {{"model", info.name}, {"parameters", to_json(fit.values)}, {"representation", material.representation}};

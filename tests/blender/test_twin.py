@@ -3,6 +3,7 @@
 and replace the shader."""
 
 import math
+from importlib import import_module
 
 import bpy
 import eevee
@@ -442,3 +443,19 @@ def test_arguments_that_python_lacks_a_number_for(extension, empty):
     with pytest.raises(ValueError, match="Expected a text, got None"):
         api.new_sum([("lambert", {})], name=None)
     assert set(bpy.data.materials) == before
+
+
+def test_what_was_painted_on_a_table_is_undone_when_the_file_is_saved(extension, empty, tmp_path):
+    """Texture Paint offers all images in a material, and takes a table as its canvas."""
+    extension.api.new_material("kelemen")
+    table = import_module(f"{extension.package}.content.twin").TABLE
+    images = [i for i in bpy.data.images if table in i]
+    assert images and not any(image.is_dirty for image in images)
+    before = [np.array(image.pixels[:]) for image in images]
+    for image in images:
+        image.pixels[0] = 17.0
+    assert all(image.is_dirty for image in images)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "painted.blend"))
+    assert not any(image.is_dirty for image in images)
+    for image, pixels in zip(images, before, strict=True):
+        np.testing.assert_array_equal(image.pixels[:], pixels)

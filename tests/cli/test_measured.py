@@ -445,7 +445,7 @@ def test_why_a_model_stands_below_one_with_a_larger_error_is_said(tmp_path):
         file.write_text(angle_table(ti, pi, to, po, f, f, f), encoding="utf-8")
         done = run("measured", file, "--models", models)
         assert done.returncode == 0, done.stderr
-        lines = done.stdout.partition("misplaced")[2].splitlines()[1:]
+        lines = done.stdout.partition("  error  ")[2].splitlines()[1:]
         rows = [re.match(r"  (\w+) +([\d.]+) %", line) for line in lines]
         return [(row[1], float(row[2])) for row in rows if row], lines
 
@@ -454,7 +454,7 @@ def test_why_a_model_stands_below_one_with_a_larger_error_is_said(tmp_path):
     assert [model for model, _ in rows] == ["lambert", "schlick"] and rows[0][1] > rows[1][1]
     assert "its mirror" in lines[1]
     assert lines[2:] == [
-        "  the order counts the light of a mirror as misplaced, which the column does not"
+        "  the order counts the light of a mirror as an error, which the column does not"
     ]
     rim = 0.05 + 0.2 * (1 - unit(wi + wo)[:, 2] ** 2)
     rows, lines = printed(rim, "lambert,oren_nayar,coupled")
@@ -1056,7 +1056,7 @@ def test_a_scene_has_the_model_that_is_fitted(tmp_path):
     pixels, said = rendered(tmp_path, material)
     raw, _ = rendered(tmp_path, {"measured": file.name})
     np.testing.assert_allclose(pixels.mean((0, 1)), raw.mean((0, 1)), rtol=0.03)
-    assert re.search(r"lobe.csv: blinn misplaces 0\.\d+ % of the light: ks=", said)
+    assert re.search(r"lobe.csv: blinn, error 0\.\d+ %: ks=", said)
 
     def resolved(material):
         content = scene(materials={"m": material}, **PLANE)
@@ -1100,7 +1100,7 @@ def test_sums_of_lobes_are_told(tmp_path):
     assert json.loads(without.stdout)["sums"][-1]["error"] > 2 * two["error"]
     text = run("measured", file, "--lobes", "2").stdout
     assert re.search(r"^ +2 +0\.\d+ % .* blinn", text, re.M), text
-    assert re.search(r"% +lambert rho=", text) and "misplaced" in text
+    assert re.search(r"% +lambert rho=", text) and "  error  " in text
     for options, expected in (
         (("--lobes", "13"), "--lobes"),
         (("--lobes", "2", "--from", "wart"), "wart has no lobe for a sum, expected all or some of"),
@@ -1127,7 +1127,7 @@ def test_a_scene_has_the_sum_that_is_fitted(tmp_path):
         for strategy in ("mis", "brdf", "light"):
             pixels, said = rendered(tmp_path, material, "--strategy", strategy, **lit)
             np.testing.assert_allclose(pixels.mean((0, 1)), raw.mean((0, 1)), rtol=0.02)
-        assert re.search(r"lobe.csv: .* misplaces 0\.\d+ % of the light", said)
+        assert re.search(r"lobe.csv: .*, error 0\.\d+ %", said)
         assert not re.search(r"[1-9]\d*\.\d{5}|\.0*[1-9]\d{4}", said), said  # four digits
         done = run("scene", tmp_path / "s.json", "--out", tmp_path / "out")
         assert done.returncode == 0, done.stderr

@@ -154,7 +154,7 @@ def test_a_page_of_a_file(tmp_path, demo):
     scenes = {n: json.loads((out / "paint" / f"{n}.json").read_text()) for n in demo_measured.FITS}
     assert scenes["curves"]["materials"]["ball"]["model"] == "factors"
     assert len(scenes["lobes"]["materials"]["ball"]["sum"]) > 1
-    said = re.findall(r"^ +(\S.*?) +misplaces +([\d.]+) %", done.stdout, re.M)
+    said = re.findall(r"^ +(\S.*?) +error +([\d.]+) %", done.stdout, re.M)
     off = {fit: float(error) for fit, error in said}
     assert off["sum of lobes"] < off["nearest formula"] and off["sum of lobes"] < off["curves"]
     records = {p: p.read_bytes() for p in (out / "paint" / "tasks").glob("*.json")}
