@@ -170,9 +170,9 @@ def energy_text(node):
     return ", ".join(numbers) or say("not at a view angle of this scene")
 
 
-def _add_method(row, node, name, pressed):
+def _add_method(layout, node, name, pressed):
     """The button of a render method."""
-    item = row.operator("brdfc.switch", text=form_name(name).template, depress=pressed)
+    item = layout.operator("brdfc.switch", text=form_name(name).template, depress=pressed)
     item.node, item.representation = model_nodes.key(node), name
 
 
@@ -186,22 +186,26 @@ def _draw_form(layout, node, form, scene, changes):
             ),
         )
     model = pack.model(model_name)
-    row = layout.row(align=True)
-    row.enabled = changes
+    # In one row their names would be cut off at the default width of the sidebar.
+    methods = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
+    methods.enabled = changes
     values = {key: model_nodes.get_value(node, key) for key in model.parameters}
     refusals, automatic = [], model_nodes.is_automatic(node)
     if model.native_form:
-        _add_method(row, node, "auto", automatic)
+        _add_method(methods, node, "auto", automatic)
     for name, method in model.forms.items():
         if refusal := method.refusal(values):
             refusals.append(refusal)
             continue
-        _add_method(row, node, name, name == representation and not lean and not automatic)
+        if not method.is_native and not pack.osl_available():
+            refusals.append(pack.NO_OSL)
+            continue
+        _add_method(methods, node, name, name == representation and not lean and not automatic)
     column = layout.column(align=True)
     if automatic:
         wrapped(column, METHODS["auto"])
     wrapped(column, METHODS[representation])
-    for refusal in refusals:
+    for refusal in dict.fromkeys(refusals):
         wrapped(column, refusal)
     # A button instead of a label, which could have no tooltip to explain the number.
     line = column.row()

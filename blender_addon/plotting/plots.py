@@ -53,8 +53,8 @@ class Legend:
 
 
 def glossy_slice(alpha, theta):
-    """The same for Blender's white Glossy node with the GGX distribution of this alpha, which is
-    the roughness squared; without multiple scattering: (N,)."""
+    """f cos (N,) of Blender's white Glossy node, for light from INCIDENCE, at angles theta: the GGX
+    distribution with this alpha, which is the roughness squared, without multiple scattering."""
     light = reflected.in_plane(np.radians(-reflected.INCIDENCE))
     return native_bsdf.facets(reflected.in_plane(theta), light, (alpha, alpha))
 

@@ -429,7 +429,7 @@ class Layout:
     def _sub(self, **_):
         return Layout(self.log, self.greyed, self.enabled)
 
-    row = column = box = _sub
+    row = column = box = grid_flow = _sub
 
     def separator(self, **_):
         pass
