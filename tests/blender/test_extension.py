@@ -657,6 +657,11 @@ def test_group_of_another_version_is_offered_for_update(extension, empty, monkey
 # Warnings
 
 
+def add_bright_lamp(scene):
+    """A lamp whose light clamps and filters show in."""
+    helpers.add_lamp(scene, energy=1e5, shadow_soft_size=1)
+
+
 def clean(extension, scene, model="lambert", form="exact"):
     """A material without any warnings."""
     material = extension.api.new_material(model, form)
@@ -955,6 +960,7 @@ def test_warning_far_orthographic_camera(extension, empty):
 )
 def test_warnings_a_form_may_declare(extension, empty, monkeypatch, code, spoil):
     material = clean(extension, empty)
+    add_bright_lamp(empty)
     entry = extension.pack.model("lambert").forms["exact"].entry
     for name, value in {
         "blur_glossy": 0,
@@ -984,7 +990,7 @@ def test_warnings_of_formula_nodes(extension, empty, code, setting, value):
 
 
 def test_warning_clamp_that_shows_in_exact_forms(extension, empty):
-    """In a mirror always; in a highlight if the clamp is low."""
+    """In a mirror always; in a highlight if the clamp is low; under a dim world never."""
     mirror = clean(extension, empty, "coupled", "exact")
     highlight = clean(extension, empty, "modified_phong", "exact")
     for clamp, in_mirror, in_highlight in (
@@ -993,8 +999,11 @@ def test_warning_clamp_that_shows_in_exact_forms(extension, empty):
         (1, ["clamp_mirror"], ["clamp_low"]),
     ):
         empty.cycles.sample_clamp_indirect = clamp
+        assert codes(extension, mirror, empty) == (in_mirror if clamp < 10 else [])
+        add_bright_lamp(empty)
         assert codes(extension, mirror, empty) == in_mirror
         assert codes(extension, highlight, empty) == in_highlight
+        bpy.data.objects.remove(empty.objects["Lamp"])
 
 
 def test_warning_clamp_that_shows_in_a_narrow_highlight(extension, empty):
@@ -1006,13 +1015,15 @@ def test_warning_clamp_that_shows_in_a_narrow_highlight(extension, empty):
         ("max_phong", "aimed"),
     ):
         material = clean(extension, empty, model, form)
+        add_bright_lamp(empty)
         empty.cycles.sample_clamp_indirect = 10
         extension.api.set_parameters(material, e=10.0)
         assert codes(extension, material, empty) == []
         extension.api.set_parameters(material, e=500.0)
         assert codes(extension, material, empty) == ["clamp_low"]
-        empty.cycles.sample_clamp_indirect = 0
+        bpy.data.objects.remove(empty.objects["Lamp"])
         assert codes(extension, material, empty) == []
+        empty.cycles.sample_clamp_indirect = 0
 
 
 def test_warning_normal_pass(extension, empty):
@@ -1128,6 +1139,7 @@ def test_warnings_of_formula_nodes_by_their_base(extension, empty, model, values
     """Cones with ramps and rough facets are too bright in passes; Filter Glossy blurs facets."""
     material = clean(extension, empty, model, "nodes")
     extension.api.set_parameters(material, **values)
+    add_bright_lamp(empty)
     assert codes(extension, material, empty) == []
     empty.view_layers[0].use_pass_glossy_color = True
     empty.cycles.blur_glossy = 1.0
