@@ -80,9 +80,10 @@ class SceneContext:
     @cached_property
     def is_lit_as_new(self):
         """Whether the scene is lit by nothing but point lamps no brighter than a new one of
-        Blender, if there are any, and a uniform world no brighter than white. Measured for such a scene with a floor
-        (fresnel_conductor, schlick, coupled, radziszewski_alda): a clamp at 10 takes no light, and
-        Filter Glossy at 1 changes blocks of 8 x 8 pixels by at most 0.6 %."""
+        Blender, if there are any, and a uniform world no brighter than white. Measured for such a
+        scene with a lamp and a floor (fresnel_conductor, schlick, coupled, radziszewski_alda): a
+        clamp at 10 takes no light, and Filter Glossy at 1 changes blocks of 8 x 8 pixels by at most
+        0.6 %."""
         found = [item.data for item in self.lamps]
         return self._is_evenly_dim and all(lamps.kind_of(data).is_like_new(data) for data in found)
 

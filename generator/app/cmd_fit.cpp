@@ -25,10 +25,10 @@ void print_errors(const std::vector<fit::ViewError>& errors, const std::string& 
   std::sort(l1.begin(), l1.end());
   // The q-quantile of the errors over views.
   const auto quantile = [&](double q) { return in_percent(l1[std::size_t(std::ceil(q * double(l1.size()))) - 1]); };
-  fmt::print(
-      stderr,
-      "{}: error by view, the fraction of the light reflected in other directions: median {} %, 95th percentile {} %, at most {} %\n",
-      label, quantile(0.5), quantile(0.95), quantile(1));
+  fmt::print(stderr,
+             "{}: error by view, the fraction of the light reflected in other directions: median {} %, 95th percentile "
+             "{} %, at most {} %\n",
+             label, quantile(0.5), quantile(0.95), quantile(1));
   CsvWriter out((axis.empty() ? "" : axis + ",") + "cos_theta_o,relative_l1,relative_l2,albedo,negative");
   for (const fit::ViewError& e : errors) {
     std::vector<double> row = {e.cos_theta_o, e.relative_l1, e.relative_l2, e.albedo, e.negative};

@@ -227,7 +227,7 @@ class MaterialReader {
       for (const measured::Lobe& lobe : sum.lobes)
         each.push_back(lobe.model->info().name + " " + described(lobe.model->info(), lobe.values));
       note_error("a sum of " + measured::counted(sum.lobes.size(), "lobe", "lobes"), sum.error,
-                fmt::format("{}", fmt::join(each, " + ")));
+                 fmt::format("{}", fmt::join(each, " + ")));
       if (const auto said = measured::gain_of_sum(sum.brightest)) files_.note(measurement.file + ": " + *said);
       set_stack(sum.lobes, measured::Stack::Sum, material, resolved);
       return;
@@ -244,7 +244,7 @@ class MaterialReader {
       const Model& lambert = find_model("lambert");
       const ParamValues rho{{"rho", std::array<double, 3>{fit.matte->r, fit.matte->g, fit.matte->b}}};
       note_error(info.name + " with lambert", fit.error,
-                described(info, fit.values) + " + " + described(lambert.info(), rho) + measured::remarks(fit));
+                 described(info, fit.values) + " + " + described(lambert.info(), rho) + measured::remarks(fit));
       set_stack({{fit.model, fit.values}, {&lambert, rho}}, measured::Stack::Sum, material, resolved);
       return;
     }
