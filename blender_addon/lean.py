@@ -215,6 +215,7 @@ class Baking(Job):
         nodes.remove_unused_groups()
         self._afterwards()
         self.result = sum(map(model_nodes.is_baked, dict.fromkeys(found.values())))
+        self.whole = len(dict.fromkeys(found.values())) - self.result
 
     def _put(self, groups):
         """Puts all groups into their nodes, or none. A node keeps its own group if another shader

@@ -70,11 +70,19 @@ def _script_problem(script, inputs, outputs):
     return None
 
 
+def _has_lost_groups(group):
+    """Whether a group inside it, or inside a form inside it, was deleted."""
+    inner = [n.node_tree for n in group.nodes if n.bl_idname == "ShaderNodeGroup"]
+    return None in inner or any(_has_lost_groups(g) for g in inner if TAG in g)
+
+
 def script_problem(group):
-    """What is wrong with a group's script nodes, or None.
+    """What is wrong with a group's script nodes and the groups inside it, or None.
 
     Cycles raises no error when a shader fails to compile: the node is left without sockets.
     """
+    if _has_lost_groups(group):
+        return "has lost a group inside it"
     if is_native(group):
         return None
     tag = group[TAG]

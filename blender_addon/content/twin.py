@@ -6,6 +6,7 @@ A twin runs where Open Shading Language does not: EEVEE, any GPU, render farms. 
 tables and writes them to the extension's twins/*.json; the wiring of the nodes is here.
 """
 
+import hashlib
 import math
 
 import bpy
@@ -25,15 +26,28 @@ class _Curves:
         return self.wiring.curve(self.cos_theta, rows[0])
 
 
-#: The custom property of the images below.
+#: The custom property of the images below: a hash of their pixels.
 TABLE = "brdfc_table"
 
 
-def restore_tables():
-    """Undoes what was painted on tables: Texture Paint offers them, as all images of materials."""
+def _hash_of(image):
+    pixels = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(pixels)
+    return hashlib.sha256(pixels.tobytes()).hexdigest()[:16]
+
+
+def painted_tables():
+    """The images of tables that were painted on: Texture Paint offers them, as all images of
+    materials. What is not yet packed is undone."""
+    found = set()
     for image in bpy.data.images:
-        if image.library is None and TABLE in image and image.is_dirty:
+        if image.library is not None or TABLE not in image:
+            continue
+        if image.is_dirty:
             image.reload()
+        if _hash_of(image) != image[TABLE]:
+            found.add(image)
+    return found
 
 
 class Picture:
@@ -56,7 +70,7 @@ class Picture:
         self.image.alpha_mode = "NONE"
         self.image.pixels.foreach_set(pixels.ravel())
         self.image.pack()
-        self.image[TABLE] = True
+        self.image[TABLE] = _hash_of(self.image)
         # From the centre of the first pixel to the centre of the last.
         self.u = wiring.math("MULTIPLY_ADD", cos_theta, (width - 1) / width, 0.5 / width)
         self.count, self.height = count, height

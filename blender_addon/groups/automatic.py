@@ -19,7 +19,6 @@ from bpy.app.handlers import persistent
 from .. import lamps
 from ..common import app_handlers
 from ..common.i18n import of_error
-from ..content import twin
 from ..packs import device
 from . import nodes
 
@@ -99,7 +98,7 @@ def _before_save(*_):
     them each time that the file is opened."""
     if not nodes.is_at_work():
         nodes.remove_unused_groups()
-    twin.restore_tables()
+    nodes.restore_tables()
     _now()
 
 

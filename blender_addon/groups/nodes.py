@@ -13,7 +13,7 @@ import bpy
 from .. import lamps
 from ..common import editable, enabling
 from ..common.i18n import say
-from ..content import group_content, part_groups, stand_in
+from ..content import group_content, part_groups, stand_in, twin
 from ..content.group_content import ALBEDO, script_problem
 from ..content.group_sockets import has_own_choices
 from ..packs import device, pack
@@ -345,6 +345,22 @@ def make_local(tree):
             make_local(node.node_tree)
 
 
+def restore_tables():
+    """Makes the groups of Blender's own nodes anew whose tables were painted on."""
+    if not (painted := twin.painted_tables()):
+        return
+    for group in [g for g in bpy.data.node_groups if TAG in g and g.library is None]:
+        images = {n.image for n in group.nodes if n.bl_idname == "ShaderNodeTexImage"}
+        if not (images & painted and group_content.is_native(group)):
+            continue
+        if not model_nodes.is_current(group) or "baked" in group[TAG]:
+            continue
+        form = pack.model(group[TAG]["model"]).forms[group[TAG]["representation"]]
+        group[TAG]["digest"] = ""  # so that another one is made
+        group.user_remap(_group_of(form, _room_of(group[TAG])))
+        remove_group(group)
+
+
 def remove_group(group):
     """Removes a group from the file, and its texts, images and twin if nothing else uses them."""
     texts = {n.script for n in group.nodes if n.bl_idname == "ShaderNodeScript" and n.script}
@@ -456,32 +472,47 @@ def has_linked_outputs(node, group):
 
 
 def replace_group(node, group):
-    """Puts another group of the same model into a group node; values, links and animation stay.
-    Animation of inputs that the new group lacks is muted."""
-    if group == node.node_tree:
+    """Puts another group of the same model into a group node; values, links, animation and which
+    sockets are hidden stay. Animation of inputs that the new group lacks is muted. If it raises,
+    the node is as it was."""
+    before = node.node_tree
+    if group == before:
         return
-    tree = node.id_data
-    names = {s.identifier: name for name, s in model_nodes.sockets(node).items()}
+    tree, sockets = node.id_data, model_nodes.sockets(node)
+    names = {s.identifier: name for name, s in sockets.items()}
     animated = [(*moves, names.get(identifier)) for *moves, identifier in animation.capture(node)]
     values = model_nodes.all_values(node)
     incoming = [
-        (link.from_socket, name, link.is_muted)
-        for name, s in model_nodes.sockets(node).items()
-        for link in s.links
+        (link.from_socket, name, link.is_muted) for name, s in sockets.items() for link in s.links
     ]
     outgoing = [(s.name, link.to_socket, link.is_muted) for s in node.outputs for link in s.links]
+    hidden = {name for name, s in sockets.items() if s.hide}
+    hidden_outputs = {s.name for s in node.outputs if s.hide}
     for link in [link for s in (*node.inputs, *node.outputs) for link in s.links]:
         tree.links.remove(link)
-    node.node_tree = group
-    present = model_nodes.sockets(node)
-    for name, value in values.items():
-        if name in present and value is not None:
-            model_nodes.set_value(node, name, value)
-    for source, name, muted in incoming:
-        if name in present:
-            tree.links.new(source, present[name]).is_muted = muted
-    for name, target, muted in outgoing:
-        tree.links.new(node.outputs[name], target).is_muted = muted
+
+    def put(group):
+        node.node_tree = group
+        present = model_nodes.sockets(node)
+        for name, value in values.items():
+            if name in present and value is not None:
+                model_nodes.set_value(node, name, value)
+        for source, name, muted in incoming:
+            if name in present:
+                tree.links.new(source, present[name]).is_muted = muted
+        for name, target, muted in outgoing:
+            tree.links.new(node.outputs[name], target).is_muted = muted
+        for name, socket in present.items():
+            socket.hide = name in hidden
+        for socket in node.outputs:
+            socket.hide = socket.name in hidden_outputs
+        return present
+
+    try:
+        present = put(group)
+    except BaseException:
+        put(before)
+        raise
     for curve, owner, name in animated:  # curves address sockets by index
         if name in present:
             animation.retarget(curve, owner, present[name])

@@ -7,8 +7,9 @@ import bpy
 
 from . import slots
 
-#: Name of the shared group, and the custom property that identifies it.
-GROUP = "brdfc Lamps"
+#: Name of the shared group, which a dot keeps out of menus, and the custom property that
+#: identifies it.
+GROUP = ".brdfc Lamps"
 TAG = "brdfc_lamps"
 
 

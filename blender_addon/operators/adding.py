@@ -45,8 +45,9 @@ class BRDFC_OT_add_node(_ModelOperator, Operator):
             space is not None
             and space.type == "NODE_EDITOR"
             and space.tree_type == "ShaderNodeTree"
+            and isinstance(space.id, bpy.types.Material)  # other trees have no surface
             and space.edit_tree is not None
-            and keeps_changes(cls, *filter(None, (space.id, space.edit_tree)))
+            and keeps_changes(cls, space.id, space.edit_tree)
         )
 
     def execute(self, context):

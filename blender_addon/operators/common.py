@@ -5,6 +5,7 @@ import bpy
 
 from ..common import editable
 from ..common.i18n import Sentence, iface, of_error, rpt, say, tip
+from ..common.interface import material_of
 from ..warnings import checks
 
 ERRORS = (ValueError, RuntimeError)  # CompileError and PackError are RuntimeErrors
@@ -28,13 +29,13 @@ def report_osl(operator, ours, scene):
 class OfActiveMaterial:
     @classmethod
     def poll(cls, context):
-        return getattr(context.object, "active_material", None) is not None
+        return material_of(context) is not None
 
 
 class ChangesActiveMaterial(OfActiveMaterial):
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and keeps_changes(cls, context.object.active_material)
+        return super().poll(context) and keeps_changes(cls, material_of(context))
 
 
 def keeps_changes(operator, *blocks):

@@ -8,6 +8,7 @@ from bpy.types import Operator
 
 from .. import api, convert
 from ..common.i18n import of_error, rpt, say, tip
+from ..common.interface import material_of
 from ..groups import model_nodes
 from ..panels.labels import wrapped
 from .common import ERRORS, ChangesActiveMaterial, refused, report_osl
@@ -127,7 +128,7 @@ class BRDFC_OT_to_models(ChangesActiveMaterial, Operator):
 
     def execute(self, context):
         try:
-            done = api.restore_models(context.object.active_material)
+            done = api.restore_models(material_of(context))
         except ERRORS as error:
             return refused(self, error)
         return {"FINISHED"} if done else {"CANCELLED"}
@@ -144,7 +145,7 @@ class BRDFC_OT_convert_back(ChangesActiveMaterial, Operator):
 
     def execute(self, context):
         try:
-            count = api.convert_back(context.object.active_material)
+            count = api.convert_back(material_of(context))
         except ERRORS as error:
             return refused(self, error)
         self.report({"INFO"}, rpt(say("Nodes put back: {count}", count=count)))

@@ -145,4 +145,9 @@ class BRDFC_OT_bake_apply(ModalJob, Operator):
 
     def finish(self, context, count):
         self.report({"INFO"}, rpt(say("Nodes that are lean now: {count}", count=count)))
+        if whole := self.job.whole:
+            said = say(
+                "Nodes that stay whole, as another shader reads their albedo: {count}", count=whole
+            )
+            self.report({"INFO"}, rpt(said))
         return {"FINISHED"}

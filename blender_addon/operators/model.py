@@ -10,6 +10,7 @@ from bpy.types import Operator
 from .. import api
 from ..common import color, editable
 from ..common.i18n import Sentence, iface, of_error, rpt, say, tip
+from ..common.interface import material_of
 from ..groups import model_nodes, nodes
 from ..packs import kernel, optical, pack
 from ..panels.labels import wrapped
@@ -40,7 +41,7 @@ class BRDFC_OT_switch(ChangesActiveMaterial, Operator):
         return tip(METHODS.get(properties.representation) or Sentence(cls.bl_description))
 
     def execute(self, context):
-        material = context.object.active_material
+        material = material_of(context)
         materials = bpy.data.materials if self.all_users else [material]
         try:
             node = model_nodes.named(material, self.node)
@@ -91,7 +92,7 @@ class BRDFC_OT_details(OfActiveMaterial, Operator):
         from ..panels import ui
 
         try:
-            node = model_nodes.named(context.object.active_material, self.node)
+            node = model_nodes.named(material_of(context), self.node)
             made = model_nodes.manifest_entry(node)
         except ERRORS as error:
             said, more = of_error(error)
@@ -149,7 +150,7 @@ class BRDFC_OT_add_albedo(ChangesActiveMaterial, Operator):
     node: StringProperty(name="Node", description="Name of the group node")
 
     def execute(self, context):
-        material = context.object.active_material
+        material = material_of(context)
         try:
             nodes.add_albedo(model_nodes.named(material, self.node))
         except ERRORS as error:
@@ -168,7 +169,7 @@ class BRDFC_OT_add_coat(ChangesActiveMaterial, Operator):
 
     def execute(self, context):
         try:
-            api.add_coat(context.object.active_material)
+            api.add_coat(material_of(context))
         except ERRORS as error:
             return refused(self, error)
         return {"FINISHED"}
@@ -188,7 +189,7 @@ class BRDFC_OT_kernel(ChangesActiveMaterial, Operator):
     )
 
     def execute(self, context):
-        material = context.object.active_material
+        material = material_of(context)
         try:
             node = self._group(material)
             api.set_kernel(node, self._curve(node.id_data))
@@ -292,7 +293,7 @@ class BRDFC_OT_substance(ChangesActiveMaterial, Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context):
-        material = context.object.active_material
+        material = material_of(context)
         name = bpy.path.abspath(self.filepath) if self.substance == _FILE else self.substance
         try:
             if self.substance == _FILE and not name.lower().endswith(optical.ENDINGS):

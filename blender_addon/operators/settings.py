@@ -5,6 +5,7 @@ from bpy.types import Operator
 
 from .. import api
 from ..common.i18n import rpt, say
+from ..common.interface import material_of
 from ..warnings import checks
 from .common import ChangesActiveMaterial, OfActiveMaterial, refused
 
@@ -34,7 +35,7 @@ class BRDFC_OT_fix_material(ChangesActiveMaterial, Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context):
-        changes = api.prepare_material(context.object.active_material)
+        changes = api.prepare_material(material_of(context))
         for change in changes or [say("Nothing to change")]:
             self.report({"INFO"}, rpt(change))
         return {"FINISHED"}

@@ -10,6 +10,7 @@ from bpy.types import Panel
 
 from ..common import color
 from ..common.i18n import form_name, in_percent, of_error, say
+from ..common.interface import material_of
 from ..groups import model_nodes
 from ..packs import pack
 from ..plotting import nearest_node
@@ -147,21 +148,17 @@ def draw_plots(layout, material):
             wrapped(column, said, "INFO")
 
 
-def _material(context):
-    return getattr(context.object, "active_material", None)
-
-
 class _Plots:
     bl_label = "Plots"
     bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context):
-        return _material(context) is not None
+        return material_of(context) is not None
 
     def draw(self, context):
         try:
-            draw_plots(self.layout, _material(context))
+            draw_plots(self.layout, material_of(context))
         except pack.PackError as error:
             wrapped(self.layout, of_error(error)[0], "ERROR")
 

@@ -10,6 +10,7 @@ from bpy.types import Menu, Panel
 from .. import convert, lamps
 from ..common import color, editable
 from ..common.i18n import form_name, iface, in_percent, of_error, say
+from ..common.interface import material_of
 from ..groups import model_nodes, nodes
 from ..packs import energy, kernel, optical, pack
 from ..trees import shader_trees
@@ -63,6 +64,8 @@ class MATERIAL_MT_brdfc(Menu):
 
 
 def draw_add_menu(self, context):
+    if context.space_data is not None and material_of(context) is None:
+        return  # the tree of a world, a lamp or a line style
     self.layout.separator()
     self.layout.menu(NODE_MT_brdfc.bl_idname)
 
@@ -348,7 +351,7 @@ class _BrdfcPanel:
 
     def draw(self, context):
         try:
-            draw_material(self.layout, context.object.active_material, context.scene)
+            draw_material(self.layout, material_of(context), context.scene)
         except pack.PackError as error:
             said, _ = of_error(error)
             wrapped(self.layout, said, "ERROR")
@@ -356,7 +359,7 @@ class _BrdfcPanel:
 
 
 def _has_ours(context):
-    material = getattr(context.object, "active_material", None)
+    material = material_of(context)
     return material is not None and bool(model_nodes.group_nodes(material))
 
 

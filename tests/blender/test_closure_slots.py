@@ -27,7 +27,7 @@ def filled():
     """The number of slots that hold a lamp after Blender's handlers have run."""
     for _ in range(2):
         bpy.context.view_layer.update()
-    nodes = bpy.data.node_groups["brdfc Lamps"].nodes
+    nodes = bpy.data.node_groups[".brdfc Lamps"].nodes
     return sum(nodes[f"LampShape{i}"].inputs[0].default_value > 0 for i in range(1, 9))
 
 

@@ -403,7 +403,7 @@ def room_of(extension, material):
         groups = [n for n in tree.nodes if n.bl_idname == "ShaderNodeGroup"]
         return [n for n in groups if name in n.node_tree.name]
 
-    (shared,) = inside(inner, "brdfc Lamps")
+    (shared,) = inside(inner, ".brdfc Lamps")
     slots = sum(o.is_linked for o in shared.outputs) // 4
     (formulas,) = inside(inner, "formulas")
     lamps = inside(formulas.node_tree, ": lamp")

@@ -5,6 +5,7 @@ versions of the extension made."""
 import contextlib
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import helpers
@@ -288,3 +289,75 @@ def test_what_is_cut_to_a_file_never_replaces_the_whole(extension, empty, phong,
     assert [p.name for p in Path(repository).iterdir() if p.name.startswith("b")] == [
         "brdfc_shaders"
     ]
+
+
+def test_a_deleted_group_of_lamps_is_an_error_with_a_way_out(extension, empty):
+    """The panel said that all was well, and new materials used the damaged group."""
+    material = extension.api.new_material("ward")
+    helpers.add_sphere(empty, material)
+    bpy.data.node_groups.remove(bpy.data.node_groups[".brdfc Lamps"])
+    said = [w for w in extension.api.warnings(material, empty) if w.code == "script_failed"]
+    assert said and said[0].severity == "ERROR"
+    other = extension.api.new_material("ward")
+    assert "script_failed" not in [w.code for w in extension.api.warnings(other, empty)]
+    extension.api.switch_representation(material, "nodes")
+    extension.api.switch_representation(material, "auto")
+    assert "script_failed" not in [w.code for w in extension.api.warnings(material, empty)]
+
+
+def test_hidden_sockets_stay_hidden(extension, empty):
+    """They moved by one place, as another group has other sockets before them."""
+    material = extension.api.new_material("ward")
+    (node,) = extension.model_nodes.group_nodes(material)
+    for name in ("ks", extension.pack.TANGENT):
+        extension.model_nodes.sockets(node)[name].hide = True
+    for form in ("nodes", "aimed", "auto"):
+        extension.api.switch_representation(material, form)
+        sockets = extension.model_nodes.sockets(node)
+        assert {name for name, s in sockets.items() if s.hide} == {"ks", extension.pack.TANGENT}
+
+
+def test_an_exchange_that_fails_keeps_the_links(extension, empty, monkeypatch):
+    material = extension.api.new_material("ward")
+    (node,) = extension.model_nodes.group_nodes(material)
+    texture = material.node_tree.nodes.new("ShaderNodeTexNoise")
+    material.node_tree.links.new(
+        texture.outputs["Color"], extension.model_nodes.sockets(node)["ks"]
+    )
+    before = node.node_tree
+    links = {(k.from_socket, k.to_socket) for k in material.node_tree.links}
+    group = extension.nodes.ensure_group("ward", "nodes")
+    set_value = extension.model_nodes.set_value
+
+    def fail(one, name, value):
+        if one.node_tree == group:
+            raise TypeError("as if the group were damaged")
+        set_value(one, name, value)
+
+    monkeypatch.setattr(extension.model_nodes, "set_value", fail)
+    with pytest.raises(TypeError):
+        extension.nodes.replace_group(node, group)
+    assert node.node_tree == before
+    found = {(k.from_socket, k.to_socket) for k in material.node_tree.links}
+    assert len(found) == len(links) == 2
+
+
+def test_panels_and_operators_mean_the_material_that_is_shown(extension, empty):
+    """A pinned editor shows another one than that of the active object."""
+    shown, active = (extension.api.new_material("ward") for _ in range(2))
+    of = import_module(f"{extension.package}.common.interface").material_of
+    item = SimpleNamespace(active_material=active)
+
+    def context(space=None, **rest):
+        return SimpleNamespace(space_data=space, object=item, **rest)
+
+    def editor(what, tree_type="ShaderNodeTree"):
+        return SimpleNamespace(type="NODE_EDITOR", tree_type=tree_type, id=what)
+
+    assert of(context()) == active
+    assert of(context(SimpleNamespace(type="VIEW_3D"))) == active
+    assert of(context(editor(shown))) == shown
+    assert of(context(editor(bpy.data.worlds.new("World")))) is None
+    assert of(context(editor(None))) is None
+    assert of(context(SimpleNamespace(type="PROPERTIES"), material=shown)) == shown
+    assert of(SimpleNamespace(space_data=None, object=None)) is None

@@ -191,4 +191,4 @@ def test_nothing_of_the_scene_is_kept(extension, kept):
     (path,) = kept._folder().iterdir()
     with bpy.data.libraries.load(str(path)) as (there, _):
         assert there.node_groups and not there.objects and not there.scenes
-        assert not [name for name in there.node_groups if name == "brdfc Lamps"]
+        assert not [name for name in there.node_groups if name == ".brdfc Lamps"]

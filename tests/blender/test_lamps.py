@@ -198,7 +198,7 @@ def coded_slots(scene, update=True):
     if update:
         layer.update()
         layer.update()  # after changes by handlers
-    group = bpy.data.node_groups["brdfc Lamps"].evaluated_get(layer.depsgraph)
+    group = bpy.data.node_groups[".brdfc Lamps"].evaluated_get(layer.depsgraph)
     assert group.is_evaluated
     numbers = []
     for i in range(1, 9):
@@ -261,7 +261,7 @@ def test_model_groups_are_fed_by_the_one_group(extension, ball, aimed):
     model, form = aimed
     others = [m for m, e in extension.api.models().items() if form in e["representations"]]
     extension.api.new_material(others[-1], form)
-    (shared,) = [g for g in bpy.data.node_groups if g.name.startswith("brdfc Lamps")]
+    (shared,) = [g for g in bpy.data.node_groups if g.name.startswith(".brdfc Lamps")]
     count = extension.pack.model(aimed[0]).forms[aimed[1]].entry["lamps"]
     node = extension.model_nodes.group_nodes(ball.active_material)[0]
     script = next(n for n in node.node_tree.nodes if n.bl_idname == "ShaderNodeScript")
@@ -440,7 +440,7 @@ def test_a_lamp_that_animation_hides_has_an_empty_slot(ball, empty):
             lamp.keyframe_insert("hide_render", frame=frame)
 
     def kinds():
-        group = bpy.data.node_groups["brdfc Lamps"]
+        group = bpy.data.node_groups[".brdfc Lamps"]
         group = group.evaluated_get(empty.view_layers[0].depsgraph)
         codes = [group.nodes[f"LampShape{i}"].inputs[0].default_value for i in range(1, 9)]
         return [int(code % 8) for code in codes]
@@ -578,7 +578,7 @@ bpy.data.objects["Area"].data.size = 1.5
 scene.frame_set(6)
 layer = bpy.context.view_layer
 layer.update()
-group = bpy.data.node_groups["brdfc Lamps"].evaluated_get(layer.depsgraph)
+group = bpy.data.node_groups[".brdfc Lamps"].evaluated_get(layer.depsgraph)
 for lamp in ("Key", "Sun", "Area"):
     item = bpy.data.objects[lamp]
     light, matrix = item.data, item.matrix_world

@@ -277,7 +277,7 @@ def assert_aims_at(extension, material, lamp):
     (node,) = extension.model_nodes.group_nodes(material)
     content = extension.model_nodes.content_group(node.node_tree)
     inner = {getattr(n, "node_tree", None): n for n in content.nodes}
-    inner = inner[bpy.data.node_groups["brdfc Lamps"]]
+    inner = inner[bpy.data.node_groups[".brdfc Lamps"]]
     group = inner.node_tree.evaluated_get(bpy.context.evaluated_depsgraph_get())
     first = next(n for n in group.nodes if n.bl_idname == "ShaderNodeCombineXYZ")
     assert [s.default_value for s in first.inputs] == pytest.approx(list(lamp.location))
@@ -312,10 +312,10 @@ def test_dragging_brings_nothing_twice_and_finds_the_lamps(
     made_of = [
         f".{model} ({form})" for model in ("Ashikhmin-Shirley", "Ward") for form in FORMS[osl]
     ]
-    ours = {n for n in groups if not n.startswith(".brdfc ") or n == "brdfc Lamps"}
-    assert ours >= {*made_of, "brdfc Lamps"}
+    ours = {n for n in groups if not n.startswith(".brdfc ") or n == ".brdfc Lamps"}
+    assert ours >= {*made_of, ".brdfc Lamps"}
     used = {n for n in ours if bpy.data.node_groups[n].users}
-    assert {re.sub(r"\.\d+$", "", n) for n in used} == {*made_of, "brdfc Lamps"}
+    assert {re.sub(r"\.\d+$", "", n) for n in used} == {*made_of, ".brdfc Lamps"}
     assert len(texts) == (3 if osl else 0), "two shaders, and which tells whether they run"
     if made.reuse and not by_hand:
         assert names(bpy.data.materials) == ["Brushed Steel", "Red Plastic", "Turned Copper"]
@@ -333,7 +333,7 @@ def test_a_group_that_differs_does_not_give_way(extension, made, empty):
     other = drag(made, "Brushed Steel")
     (theirs,) = extension.model_nodes.group_nodes(other)
     assert theirs.node_tree != node.node_tree
-    assert len([g for g in bpy.data.node_groups if g.name.startswith("brdfc Lamps")]) == 1
+    assert len([g for g in bpy.data.node_groups if g.name.startswith(".brdfc Lamps")]) == 1
 
 
 @LIBRARY
