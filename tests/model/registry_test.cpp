@@ -141,7 +141,7 @@ TEST(Registry, RefusesNamesThatOslTheGeneratorOrPythonUse) {
               fmt::format("draft.cpp: draft: parameter name '{}': expected another name: Python uses this one", name));
   for (const char* name : {"representation", "cos_theta_o", "samples"})
     EXPECT_THAT(complaint(of_parameter(name)),
-                AllOf(HasSubstr("draft.cpp: draft: parameter name"), HasSubstr("functions in Python")))
+                AllOf(HasSubstr("draft.cpp: draft: parameter name"), HasSubstr("function in Python")))
         << name;
   for (const char* name : {"alpha", "exponent", "ior", "n_r", "rho", "size", "timely"})
     EXPECT_EQ(complaint(of_parameter(name)), "") << name;
