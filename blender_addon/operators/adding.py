@@ -7,6 +7,7 @@ from bpy.types import Operator
 
 from .. import api
 from ..common.i18n import rpt, say, tip
+from ..common.interface import may_have_surface
 from ..groups import model_nodes, nodes
 from ..packs import pack
 from .common import ERRORS, keeps_changes, refused, report_osl
@@ -45,9 +46,9 @@ class BRDFC_OT_add_node(_ModelOperator, Operator):
             space is not None
             and space.type == "NODE_EDITOR"
             and space.tree_type == "ShaderNodeTree"
-            and isinstance(space.id, bpy.types.Material)  # other trees have no surface
+            and may_have_surface(space)
             and space.edit_tree is not None
-            and keeps_changes(cls, space.id, space.edit_tree)
+            and keeps_changes(cls, *filter(None, (space.id, space.edit_tree)))
         )
 
     def execute(self, context):

@@ -10,7 +10,7 @@ from bpy.types import Menu, Panel
 from .. import convert, lamps
 from ..common import color, editable
 from ..common.i18n import form_name, iface, in_percent, of_error, say
-from ..common.interface import material_of
+from ..common.interface import material_of, may_have_surface
 from ..groups import model_nodes, nodes
 from ..packs import energy, kernel, optical, pack
 from ..trees import shader_trees
@@ -64,8 +64,8 @@ class MATERIAL_MT_brdfc(Menu):
 
 
 def draw_add_menu(self, context):
-    if context.space_data is not None and material_of(context) is None:
-        return  # the tree of a world, a lamp or a line style
+    if context.space_data is not None and not may_have_surface(context.space_data):
+        return
     self.layout.separator()
     self.layout.menu(NODE_MT_brdfc.bl_idname)
 

@@ -351,13 +351,15 @@ def test_panels_and_operators_mean_the_material_that_is_shown(extension, empty):
     def context(space=None, **rest):
         return SimpleNamespace(space_data=space, object=item, **rest)
 
-    def editor(what, tree_type="ShaderNodeTree"):
-        return SimpleNamespace(type="NODE_EDITOR", tree_type=tree_type, id=what)
+    def editor(what, tree=None):
+        kind = {"type": "NODE_EDITOR", "tree_type": "ShaderNodeTree"}
+        return SimpleNamespace(**kind, id=what, node_tree=tree)
 
     assert of(context()) == active
     assert of(context(SimpleNamespace(type="VIEW_3D"))) == active
     assert of(context(editor(shown))) == shown
     assert of(context(editor(bpy.data.worlds.new("World")))) is None
-    assert of(context(editor(None))) is None
+    assert of(context(editor(None, shown.node_tree))) == shown
+    assert of(context(editor(None, bpy.data.node_groups[0]))) is None
     assert of(context(SimpleNamespace(type="PROPERTIES"), material=shown)) == shown
     assert of(SimpleNamespace(space_data=None, object=None)) is None
