@@ -38,8 +38,8 @@ class NumberText {
     return float(value);
   }
   const std::string& where() const { return where_; }
-  /// What follows, for messages.
-  std::string_view rest() const { return rest_.substr(0, 30); }
+  /// What follows in the line, shortened, for messages.
+  std::string_view rest() const { return rest_.substr(0, rest_.find_first_of("\r\n\t\v\f")).substr(0, 30); }
 
   static constexpr double kLargest = 1e30;
 

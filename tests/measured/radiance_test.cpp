@@ -192,6 +192,8 @@ TEST(TensorTree, WhatIsWrongIsSaid) {
   };
   EXPECT_EQ(said("{1}"), "");
   EXPECT_EQ(said(""), "tree: expected '{' after 0 numbers, found the end: truncated?");
+  // A message has one line.
+  EXPECT_EQ(said("{ {1} #ALTA\nmore }"), "tree: expected '{' after 1 number, found '#ALTA'");
   EXPECT_EQ(said("{{1}{2}"), "tree: expected '{' after 2 numbers, found the end: truncated?");
   EXPECT_EQ(said("{1 2 3 4 5 6 7"), "tree: expected 1, 8, 64 or so numbers in braces, n x n x n cells, found 7");
   EXPECT_EQ(said("{1}{2}"), "tree: expected nothing after the closing brace, found '{2}'");
