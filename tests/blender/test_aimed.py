@@ -217,6 +217,7 @@ def sheet_and_cube(scene, material):
     add_camera(scene, (0, -4, 4), (math.pi / 4, 0, 0), orthographic=3)
 
 
+@pytest.mark.slow
 @pytest.mark.many
 @pytest.mark.parametrize("kind", ["SUN", "POINT", "AREA"])
 def test_a_lamp_partly_below_the_horizon(extension, empty, kind):

@@ -144,6 +144,7 @@ def test_several_models_as_formula_nodes_are_not_black(extension, cpu, models, r
     assert centre.mean() > 0.1  # parts of the ball are dark, under lamps alone
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("osl", [False, True], ids=["nodes", "aimed"])
 def test_a_closure_of_cycles_takes_no_room_of_lamps(extension, cpu, osl):
     """A metal that Blender has aims at nothing, so it leaves others of the file, and a second model

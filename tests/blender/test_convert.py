@@ -340,6 +340,7 @@ def test_a_metal_is_the_microfacet_model(convert, roughness):
         assert plan.values["f0"] == pytest.approx(GOLD)
 
 
+@pytest.mark.slow
 @pytest.mark.many
 @pytest.mark.parametrize("distribution", ["GGX", "MULTI_GGX"])
 @pytest.mark.parametrize("color", [(0.05, 0.05, 0.05), (0.05, 0.03, 0.01), GOLD])

@@ -181,6 +181,7 @@ def moving_material(extension, model="lambertian_specular"):
     return material
 
 
+@pytest.mark.slow
 @pytest.mark.many
 @pytest.mark.parametrize(
     ("kind", "watts", "warned"),
@@ -413,6 +414,7 @@ def room_of(extension, material):
     return slots, cones
 
 
+@pytest.mark.slow
 @pytest.mark.many
 @pytest.mark.parametrize("form", ["auto", "nodes"])
 def test_nodes_have_room_for_the_lamps_of_the_scene(extension, new_file, form):

@@ -108,6 +108,7 @@ def test_what_materials_add_to_a_file(extension, empty, tmp_path):
     assert again < 5e3 and ward < 270e3 and first < 620e3 and factors < 830e3
 
 
+@pytest.mark.slow
 def test_parts_that_an_append_brings_again_are_merged(extension, empty, tmp_path):
     """Materials that are appended one by one share what their models have in common. Blender's own
     time for each append grows with the groups in the file."""

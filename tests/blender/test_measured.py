@@ -415,6 +415,7 @@ def _plane(scene, material, turn):
     return picture
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("osl", [False, True], ids=["nodes", "osl"])
 def test_the_tangent_is_turned_instead_of_the_data(extension, empty, brushed, osl):
     """As if the object were turned, which takes its tangent along."""

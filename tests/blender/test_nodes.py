@@ -232,6 +232,7 @@ def test_lamps(extension, model, values, light):
     assert noise < 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["ward", "oren_nayar"])
 def test_no_dot_under_spots_beside_each_other(extension, model):
     """In Open Shading Language a lobe that is narrow because of another lamp was divided by 0 at
@@ -328,6 +329,7 @@ def sunken_ball(scene):
     add_lamp(scene, "POINT", "Ball", (0, -1.2, -0.1), energy=200, shadow_soft_size=0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.many
 @pytest.mark.parametrize("light", [upright_lamp, sunken_ball], ids=lambda f: f.__name__)
 def test_a_floor_beside_a_lamp_that_is_half_below_it(extension, empty, light):

@@ -89,6 +89,7 @@ def test_what_is_animated_stays_an_input_and_moves(extension, empty, api, animat
     assert seen_at(extension, material, "m") == pytest.approx([0.05, 0.6], abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_farm_renders_what_is_animated(extension, empty, api, tmp_path):
     """Frame 10 looks as before, with the same shader but fewer inputs, and without the
     extension."""
@@ -338,6 +339,7 @@ def test_a_refused_conversion_is_no_good_one(api, native):
 # ---- what is none --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_budgets_are_those_of_the_program(api):
     api.new_material("phong", e=40.0)
     taken = api.plan(error=5).materials

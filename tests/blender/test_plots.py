@@ -66,6 +66,7 @@ def loaded(package):
     return sorted(name.removeprefix(start) for name in sys.modules if name.startswith(start))
 
 
+@pytest.mark.slow
 def test_formulas_are_not_loaded_before_a_plot_is_drawn(
     extension, panel, empty, extension_zip, tmp_path
 ):
@@ -794,6 +795,7 @@ def test_glossy_masks_at_grazing_angles_as_cycles_does(plots, roughness):
     np.testing.assert_allclose(plots.glossy_slice(alpha, theta), expected, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_moved_slider_draws_anew_and_nothing_else_does(
     extension, panel, plots, empty, monkeypatch
 ):

@@ -195,6 +195,7 @@ bpy.ops.wm.usd_export(filepath=file)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exposed", [False, True], ids=["hidden", "exposed"])
 def test_a_process_that_exported_ends(extension_zip, tmp_path, exposed):
     """With a hook, Blender aborts where it does not find pxr, and the module bpy of 4.5 hangs."""

@@ -270,6 +270,7 @@ def test_a_full_disk_leaves_the_old_pack(pack, limit):
     assert contents(folder) == before
 
 
+@pytest.mark.slow
 def test_a_killed_build_leaves_the_old_pack(pack):
     folder, before = pack
     for delay in (0.05, 0.2, 0.4):
@@ -375,6 +376,7 @@ def test_a_scene_has_no_values_from_elsewhere(tmp_path):
     refused(run("build", "--all", "--explain", "--out", tmp_path), "--explain")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command, out, kept", [("python", ".", "brdfc"), ("explorer", "page", "page")]
 )

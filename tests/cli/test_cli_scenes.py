@@ -174,6 +174,7 @@ def test_an_upper_layer_needs_an_albedo_in_blender(model, tmp_path):
         assert (said in done.stderr) == (code == 2)
 
 
+@pytest.mark.slow
 def test_a_resolved_scene_is_the_same_bytes_again(tmp_path):
     file = tmp_path / "s.json"
     file.write_text(json.dumps(scene(environment={"procedural": "sky"})), encoding="utf-8")

@@ -136,6 +136,7 @@ def test_primaries_that_a_file_states_are_honoured(tmp_path, primaries, name, sp
     np.testing.assert_array_equal(stored, colors)
 
 
+@pytest.mark.slow
 def test_color_interop_ids_are_honoured(tmp_path):
     for id, name in (
         ("lin_rec709_scene", REC709),
@@ -234,6 +235,7 @@ def written(folder, name):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.many
 @pytest.mark.parametrize("name", [n for n in BUILT_IN if n.endswith("ocio-v2.1")])
 def test_configurations_of_aces(tmp_path, name):

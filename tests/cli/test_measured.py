@@ -146,6 +146,7 @@ def microfacets(wi, wo, roughness=0.3, f0=0.04):
     return above(wi, wo) * (np.array([0.15, 0.03, 0.015]) + lobe[:, None])
 
 
+@pytest.mark.slow
 def test_gaps_of_many_cells_are_filled_whole(tmp_path):
     """The value where the measurement ends holds beyond; a gap inside is crossed linearly. Cells
     below the horizon are no part of it."""
@@ -861,6 +862,7 @@ def test_values_of_alta_that_the_cosine_weights(tmp_path):
     np.testing.assert_allclose(pairs(file, i, o)[0], expected, rtol=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.many
 @pytest.mark.parametrize("turn", [0, 0.25, 0.5, 1])
 def test_what_a_tensor_file_reflects_is_what_is_sampled(tmp_path, turn):

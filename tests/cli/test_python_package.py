@@ -392,6 +392,7 @@ def test_the_tool_does_not_overwrite_a_folder_of_another_kind(tmp_path):
     assert (tmp_path / "brdfc" / "models" / "mine.py").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_the_same_bytes_each_time(folder, tmp_path):
     subprocess.run([TOOL, "python", "--out", tmp_path], check=True, capture_output=True)
     subprocess.run([TOOL, "python", "--out", tmp_path], check=True, capture_output=True)

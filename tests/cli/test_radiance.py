@@ -137,6 +137,7 @@ def test_lobes_are_those_that_were_averaged(tmp_path, name):
     assert means @ omega == pytest.approx(values[:, 12] @ omega, rel=5e-3)
 
 
+@pytest.mark.slow
 def test_what_a_file_says_of_its_basis_counts(tmp_path):
     """Not its name: Radiance has changed what two names mean."""
     random = np.random.default_rng(9)

@@ -124,6 +124,7 @@ class Addresses(HTMLParser):
         self.texts.append(data)
 
 
+@pytest.mark.slow
 def test_a_scene_that_was_not_rendered_is_left_out_and_named(tmp_path):
     made(tmp_path, "rendered", "phong")
     (tmp_path / "waiting").mkdir()
@@ -134,6 +135,7 @@ def test_a_scene_that_was_not_rendered_is_left_out_and_named(tmp_path):
     assert "1 scene" in reported(tmp_path)
 
 
+@pytest.mark.slow
 def test_texts_are_escaped_and_only_pictures_beside_the_page_are_loaded(tmp_path):
     name = "a 100% <ball> & #1"
     made(
@@ -159,6 +161,7 @@ def test_texts_are_escaped_and_only_pictures_beside_the_page_are_loaded(tmp_path
     assert not list(tmp_path.glob(".*")), "an unfinished file was left"
 
 
+@pytest.mark.slow
 def test_other_versions_of_blender_are_linked(tmp_path):
     made(tmp_path, "ball", "phong")
     assert "The same scenes in" not in reported(tmp_path)
@@ -189,6 +192,7 @@ def test_the_page_needs_a_report_of_its_version(tmp_path):
     assert "report.json: format: expected 2" in done.stderr
 
 
+@pytest.mark.slow
 def test_the_page_shows_what_the_closures_of_each_version_do(tmp_path):
     pages, folder = tmp_path / "report", tmp_path / "conformance"
     made(pages, "ball", "phong")
