@@ -16,7 +16,7 @@ from . import lamps
 from .common.i18n import say
 from .common.jobs import Job
 from .common.program import ToolJob, find
-from .groups import model_nodes, nodes, usage
+from .groups import exchange, model_nodes, nodes, usage
 from .packs import pack
 
 #: Forms that a budget never chooses; users can still ask for them.
@@ -211,11 +211,12 @@ class Baking(Job):
         for name, node in found.items():
             if (has := model_nodes.uses_albedo(node)) != albedo[name]:
                 groups[name] = self._group(self._plan.materials[name], has, before)
-        self._put({node: groups[name] for name, node in found.items()})
+        put = {node: groups[name] for name, node in found.items()}
+        self._put(put)
         nodes.remove_unused_groups()
         self._afterwards()
-        self.result = sum(map(model_nodes.is_baked, dict.fromkeys(found.values())))
-        self.whole = len(dict.fromkeys(found.values())) - self.result
+        self.result = sum(map(model_nodes.is_baked, put))
+        self.whole = len(put) - self.result
 
     def _put(self, groups):
         """Puts all groups into their nodes, or none. A node keeps its own group if another shader
@@ -223,11 +224,11 @@ class Baking(Job):
         before = {node: node.node_tree for node in groups}
         try:
             for node, group in groups.items():
-                if nodes.has_linked_outputs(node, group):
-                    nodes.replace_group(node, group)
+                if exchange.has_linked_outputs(node, group):
+                    exchange.replace_group(node, group)
         except BaseException:
             for node, group in before.items():
-                nodes.replace_group(node, group)
+                exchange.replace_group(node, group)
             raise
 
     def _group(self, entry, albedo, before):

@@ -95,10 +95,10 @@ def _now(*_):
 @persistent
 def _before_save(*_):
     """Blender would write the parts of a group that has no user, up to 11 MB, and drop one level of
-    them each time that the file is opened."""
+    them each time that the file is opened. And it would keep what was painted on tables."""
     if not nodes.is_at_work():
         nodes.remove_unused_groups()
-    nodes.restore_tables()
+        nodes.restore_tables()
     _now()
 
 

@@ -89,7 +89,8 @@ def _before_render(scene, *_):
 
 @persistent
 def _now(*_):
-    """After a file was loaded, before it is saved, after an undo, and after a render."""
+    """After a file was loaded, before it is saved, after an undo, and after a render; and when the
+    extension is enabled in an open file, whose lamps may have changed meanwhile."""
     global _rendering
     _rendering = filling.memory.scene = None
     filling.follow()
@@ -109,22 +110,17 @@ _HANDLERS = {
 }
 
 
-def _once():
-    """When the extension is enabled in an open file, whose lamps may have changed meanwhile."""
-    _now()
-
-
 def register():
     """Registers the handlers."""
     app_handlers.register(_HANDLERS)
     # Blender's data can't be read while the extension is being enabled. Without a window timers do
     # not run, and Blender 4.5 as a module does not end while one is registered.
     if not bpy.app.background:
-        bpy.app.timers.register(_once, first_interval=0)
+        bpy.app.timers.register(_now, first_interval=0)
 
 
 def unregister():
     """Unregisters them."""
-    if bpy.app.timers.is_registered(_once):
-        bpy.app.timers.unregister(_once)
+    if bpy.app.timers.is_registered(_now):
+        bpy.app.timers.unregister(_now)
     app_handlers.unregister(_HANDLERS)

@@ -148,8 +148,8 @@ class ModalJobOnPath(ModalJob):
         except ERRORS as error:
             return refused(self, error)
         try:
-            category, name = cls.__name__.split("_OT_")
-            operator = getattr(getattr(bpy.ops, category.lower()), name)
+            category, name = cls.bl_idname.split(".")
+            operator = getattr(getattr(bpy.ops, category), name)
             return operator("INVOKE_DEFAULT", **{self.path: getattr(self, self.path)})
         finally:
             if cls._started is not None:  # refused

@@ -261,10 +261,8 @@ def draw_node(layout, node, scene):
 
 def _lamps_seen_by(material, scene):
     """[slots.Lamp] as a material's nodes see them; one that is linked has the lamps of its file."""
-    for node in model_nodes.group_nodes(material):
-        if group := model_nodes.lamps_of_library(node):
-            return lamps.last_found(scene, group)
-    return lamps.last_found(scene)
+    groups = map(model_nodes.lamps_of_library, model_nodes.group_nodes(material))
+    return lamps.last_found(scene, next(filter(None, groups), None))
 
 
 def draw_lamps(layout, material, scene):

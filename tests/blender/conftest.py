@@ -134,6 +134,7 @@ def extension(extension_zip):
         "api",
         "common.files",
         "content.group_content",
+        "groups.exchange",
         "groups.model_nodes",
         "groups.nodes",
         "lean",

@@ -336,7 +336,7 @@ def test_an_exchange_that_fails_keeps_the_links(extension, empty, monkeypatch):
 
     monkeypatch.setattr(extension.model_nodes, "set_value", fail)
     with pytest.raises(TypeError):
-        extension.nodes.replace_group(node, group)
+        extension.exchange.replace_group(node, group)
     assert node.node_tree == before
     found = {(k.from_socket, k.to_socket) for k in material.node_tree.links}
     assert len(found) == len(links) == 2

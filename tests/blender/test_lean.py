@@ -460,12 +460,22 @@ def test_a_material_whose_albedo_is_read(extension, empty, kept_program, monkeyp
         assert (node.node_tree == group) == (linked and not osl)
 
 
+@pytest.mark.parametrize("whole", [0, 2])
+def test_how_many_nodes_stay_whole_is_said(extension, whole):
+    reports = []
+    told = SimpleNamespace(
+        job=SimpleNamespace(whole=whole), report=lambda kind, text: reports.append(text)
+    )
+    extension.operators.BRDFC_OT_bake_apply.finish(told, None, 3)
+    assert [text.endswith(": 2") for text in reports[1:]] == [True] * (whole > 0)
+
+
 def test_a_fault_while_groups_are_put_in_place_restores_all(
     extension, used, kept_program, monkeypatch
 ):
     plan, before = extension.api.plan(), counts()
     groups = {name: the_node(extension, m).node_tree for name, m in used.items()}
-    replace, calls = extension.nodes.replace_group, []
+    replace, calls = extension.exchange.replace_group, []
 
     def fail_second(node, group):
         calls.append(group)
@@ -473,7 +483,7 @@ def test_a_fault_while_groups_are_put_in_place_restores_all(
             raise KeyError("as if an output were missing")
         replace(node, group)
 
-    monkeypatch.setattr(extension.nodes, "replace_group", fail_second)
+    monkeypatch.setattr(extension.exchange, "replace_group", fail_second)
     with pytest.raises(KeyError):
         extension.api.bake(plan)
     assert {name: the_node(extension, m).node_tree for name, m in used.items()} == groups
