@@ -465,7 +465,8 @@ template <template <class> class M> class PackedOf final : public PackedBrdf {
 template <template <class> class M> class ModelOf final : public Model {
  public:
   /// `formulas` are null if the model is compiled for further instruction sets, and the processor has none of them.
-  explicit ModelOf(const PackedFormulas* formulas) : info_(M<double>::info()), packed_formulas_(formulas) {
+  explicit ModelOf(const PackedFormulas* formulas = &kPackedFormulas<M>)
+      : info_(M<double>::info()), packed_formulas_(formulas) {
     M<double> prototype;
     prototype.parameters(SchemaVisitor{info_.params});
   }
@@ -535,10 +536,9 @@ template <template <class> class M> class ModelOf final : public Model {
                                   ::brdfc::fastest(&packed::x86_64_v3::M, &packed::x86_64_v4::M)), \
                               __FILE_NAME__);
 #else
-#define BRDFC_MODEL(M)                                                                                   \
-  bool only_one_model_has_the_class_##M = ::brdfc::register_model(                                       \
-      std::make_unique<::brdfc::model::detail::ModelOf<M>>(&::brdfc::model::detail::kPackedFormulas<M>), \
-      __FILE_NAME__);
+#define BRDFC_MODEL(M)                    \
+  bool only_one_model_has_the_class_##M = \
+      ::brdfc::register_model(std::make_unique<::brdfc::model::detail::ModelOf<M>>(), __FILE_NAME__);
 #endif
 
 }  // namespace brdfc::inline model
