@@ -17,6 +17,7 @@
 #include "core/data_dir.h"
 #include "core/json_text.h"
 #include "core/parse.h"
+#include "core/text.h"
 #include "forms/form.h"
 #include "pack/brdf_files.h"
 #include "pack/pack.h"
@@ -130,7 +131,7 @@ void explain(const Options& options, const std::vector<plan::PlannedModel>& plan
     return;
   }
   for (const plan::PlannedModel& p : plan) {
-    fmt::print("{}, for {}\n", p.model->info().name, fmt::join(p.materials, ", "));
+    fmt::print("{}, for {}\n", p.model->info().name, join(p.materials, ", "));
     for (const plan::FormChoice& c : p.choices) {
       const nlohmann::ordered_json error = error_of(p, c, result);
       fmt::print("  {:<10} {:>6} {:>11}  {} {}\n", c.form->name(), c.cost ? fmt::format("{:.2f}x", *c.cost) : "-",
@@ -149,7 +150,7 @@ void explain(const Options& options, const std::vector<plan::PlannedModel>& plan
             l.whole_statements, l.statements, l.whole_closures, l.closures, l.whole_table_floats, l.table_floats);
   }
   fmt::print("costs: CPU time with default parameters, in units of Blender's Glossy node at equal samples\n");
-  if (!unused.empty()) fmt::print("without the models that no material uses: {}\n", fmt::join(unused, ", "));
+  if (!unused.empty()) fmt::print("without the models that no material uses: {}\n", join(unused, ", "));
 }
 
 /// Refuses what only makes sense for an extension.

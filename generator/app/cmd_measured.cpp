@@ -80,7 +80,7 @@ void print_sums(const std::vector<measured::LobeSum>& sums, int asked) {
     std::vector<std::string> names;
     for (const measured::Lobe& lobe : sum.lobes) names.push_back(lobe.model->info().name);
     fmt::print("  {:>5}{:>10.2f} %  {:>4.1f} s  {}\n", sum.lobes.size(), 100 * sum.error, sum.seconds,
-               fmt::join(names, " + "));
+               join(names, " + "));
   }
   const measured::LobeSum& last = sums.back();
   if (last.lobes.size() < std::size_t(asked)) fmt::print("  another lobe hardly makes the error smaller\n");

@@ -7,6 +7,7 @@
 
 #include "app/commands.h"
 #include "core/csv.h"
+#include "core/text.h"
 #include "pack/probe.h"
 
 namespace brdfc::app {
@@ -20,7 +21,7 @@ void run_points(const Model& model, const ParamValues& choices) {
       for (const char* c : {"_r", "_g", "_b"}) columns.push_back(p.name + c);
   }
   CsvReader in(std::cin, "stdin", columns);
-  if (in.empty()) input_error("stdin: expected a CSV table with the header {}", fmt::join(columns, ","));
+  if (in.empty()) input_error("stdin: expected a CSV table with the header {}", join(columns, ","));
   std::vector<pack::ProbePoint> points;
   std::vector<double> row;
   while (in.next(row)) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <atomic>
@@ -11,6 +10,7 @@
 #include "app/numbers.h"
 #include "app/scene_needs.h"
 #include "core/process.h"
+#include "core/text.h"
 #include "pictures/pictures.h"
 #include "reference/color.h"
 #include "reference/image.h"
@@ -126,7 +126,7 @@ void add_render_command(Command app) {
     if (!options->preview.empty() && !options->view.empty()) {
       const std::vector<std::string> views = reference::ColorConfig::current().views();
       if (std::find(views.begin(), views.end(), options->view) == views.end())
-        input_error("--view {}: expected one of {}, the views of {}", options->view, fmt::join(views, ", "),
+        input_error("--view {}: expected one of {}, the views of {}", options->view, join(views, ", "),
                     reference::ColorConfig::current().file().string());
     }
     const reference::Scene scene = load_scene(options->scene);

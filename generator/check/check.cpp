@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "check/claim.h"
+#include "core/text.h"
 #include "measure/bound_model.h"
 #include "measure/probes.h"
 
@@ -125,8 +126,8 @@ void require_vital(const Model& model) {
     if (check.vital && run(check, trial).result == Result::Failed)
       failed.push_back(fmt::format("{} ({})", check.name, check.expected));
   if (!failed.empty())
-    throw ValueError(fmt::format("{}: fails {}: run `brdfc check {}`", model.info().name, fmt::join(failed, ", "),
-                                 model.info().name));
+    throw ValueError(
+        fmt::format("{}: fails {}: run `brdfc check {}`", model.info().name, join(failed, ", "), model.info().name));
 }
 
 }  // namespace brdfc::check

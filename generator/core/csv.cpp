@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/parse.h"
+#include "core/text.h"
 
 namespace brdfc::inline core {
 
@@ -60,7 +61,7 @@ CsvReader::CsvReader(std::istream& in, std::string source, std::vector<std::stri
     const auto found = std::find(header.begin(), header.end(), c);
     if (found == header.end())
       input_error("{}: expected a header with the columns {}; '{}' is missing, got '{:.80}'", where(),
-                  fmt::join(columns_, ","), c, fmt::to_string(fmt::join(header, ",")));
+                  join(columns_, ","), c, join(header, ","));
     if (std::find(found + 1, header.end(), c) != header.end())
       input_error("{}: expected one column {}, found several", where(), c);
     where_.push_back(std::size_t(found - header.begin()));

@@ -18,8 +18,10 @@ struct ValueError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-template <class... Args> [[noreturn]] void input_error(fmt::format_string<Args...> format, Args&&... args) {
-  throw InputError(fmt::format(format, std::forward<Args>(args)...));
+[[noreturn]] void throw_input_error(fmt::string_view format, fmt::format_args args);
+/// Throws InputError.
+template <class... Args> [[noreturn]] void input_error(fmt::format_string<Args...> format, const Args&... args) {
+  throw_input_error(format, fmt::make_format_args(args...));
 }
 
 }  // namespace brdfc::inline core

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "core/text.h"
+
 namespace brdfc::inline core {
 namespace {
 
@@ -46,7 +48,7 @@ std::string did_you_mean(const std::string& word, const std::vector<std::string>
   if (nearest.empty()) return "";
   const std::string last = nearest.back();
   nearest.pop_back();
-  return fmt::format("did you mean {}{}{}? ", fmt::join(nearest, ", "), nearest.empty() ? "" : " or ", last);
+  return fmt::format("did you mean {}{}{}? ", join(nearest, ", "), nearest.empty() ? "" : " or ", last);
 }
 
 }  // namespace brdfc::inline core

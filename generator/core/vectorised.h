@@ -9,6 +9,7 @@
 // minutes. Instead, their sources are compiled once for each instruction set (generator/CMakeLists.txt), and the types
 // that such a source computes with are in an inline namespace BRDFC_INSTRUCTION_SET. The linker then can't take a
 // function for another of the same name that needs a different processor. A test reads the names in the object files.
+// A processor with none of these instruction sets evaluates directions one by one (model/one_by_one.cpp).
 #pragma once
 
 #include <cmath>

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "forms/form.h"
 
 namespace brdfc::forms {
@@ -25,7 +26,7 @@ const Form* form(const std::string& name) {
     if (f->name() == name) return f;
     names.push_back(f->name());
   }
-  input_error("unknown form '{}': expected one of {}", name, fmt::join(names, ", "));
+  input_error("unknown form '{}': expected one of {}", name, join(names, ", "));
 }
 
 std::vector<const Form*> forms_of(const Model& model) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/text.h"
 #include "measure/albedo.h"
 
 namespace brdfc::measure {
@@ -269,7 +270,7 @@ std::string property_table(bool markdown) {
   std::string out;
   if (markdown) {
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      out += fmt::format("| {} |\n", fmt::join(rows[i], " | "));
+      out += fmt::format("| {} |\n", join(rows[i], " | "));
       if (i == 0)
         out += "|---" + std::string() + [&] {
           std::string rule;

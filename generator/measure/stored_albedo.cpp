@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "measure/albedo_file.h"
 #include "measure/albedo_settings.h"
 #include "measure/formula.h"
@@ -27,7 +28,7 @@ StoreKey stored_albedo(const Model& model) {
   // number is tabulated at its default.
   key.add("defaults", format_values(model.info(), complete(model.info(), {})));
   for (const ParamInfo& p : model.info().params)
-    key.add(p.name, fmt::format("{} {} {} {}", int(p.kind), p.min, p.max, fmt::join(p.choices, " ")));
+    key.add(p.name, fmt::format("{} {} {} {}", int(p.kind), p.min, p.max, join(p.choices, " ")));
   for (const Choices& choices : choice_combinations(model.info()))
     key.add("formula", formula_of(model, with_choices(model.info(), choices)));
   return key.add_settings(kTableSettings);

@@ -9,6 +9,7 @@
 #include "core/csv.h"
 #include "core/error.h"
 #include "core/parse.h"
+#include "core/text.h"
 #include "measured/angle_rows.h"
 #include "measured/binary_file.h"
 #include "measured/gaps.h"
@@ -58,7 +59,7 @@ constexpr OutputKind kOutputs[] = {
 template <class Kind, std::size_t N> std::string names(const Kind (&kinds)[N]) {
   std::vector<const char*> out;
   for (const Kind& kind : kinds) out.push_back(kind.name);
-  return fmt::to_string(fmt::join(out, ", "));
+  return join(out, ", ");
 }
 
 struct Header {

@@ -95,7 +95,7 @@ std::string AngleRows::say(const Angles& a) const {
   std::vector<std::string> out;
   for (std::size_t k = 0; k < 4; ++k)
     if (*names_[k]) out.push_back(fmt::format("{} {}", names_[k], degrees(a[k])));
-  return fmt::to_string(fmt::join(out, ", "));
+  return join(out, ", ");
 }
 
 void AngleRows::remove_rounding() {
@@ -144,7 +144,7 @@ std::vector<std::array<float, 3>> AngleRows::values(bool (*may_lack)(const std::
     if (*names_[k]) sizes.push_back(fmt::format("{} {}", found_[k].size(), names_[k]));
   }
   const auto fail = [&](const std::string& more) {
-    input_error("{}: expected a row for every combination of angles: {}{}", file_, fmt::join(sizes, ", "), more);
+    input_error("{}: expected a row for every combination of angles: {}{}", file_, join(sizes, ", "), more);
   };
   std::size_t room = 1;
   for (const auto& axis : found_)
@@ -212,8 +212,8 @@ void add_gaps(const char* name, const std::vector<double>& at, double turn, bool
     if ((turn > 0 && gap.width() == widest && widest > 2 * next) || (vary && gap.width() > kWide))
       said.push_back(fmt::format("{:g} to {:g}", gap.from, gap.to));
   if (!said.empty())
-    notes.push_back(fmt::format("{}: nothing was measured from {} degrees: linear between these", name,
-                                fmt::join(said, ", from ")));
+    notes.push_back(
+        fmt::format("{}: nothing was measured from {} degrees: linear between these", name, join(said, ", from ")));
 }
 
 void read_grid_of_directions(const AngleRows& rows, Measurement& out) {

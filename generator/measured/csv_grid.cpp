@@ -5,10 +5,12 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
+#include <ranges>
 #include <sstream>
 
 #include "core/csv.h"
 #include "core/error.h"
+#include "core/text.h"
 #include "core/text_file.h"
 #include "measured/angle_rows.h"
 #include "measured/binary_file.h"
@@ -61,7 +63,7 @@ Measurement read_csv_grid(const std::filesystem::path& path) {
   const bool vectors = kind == Columns::Vectors;
   const std::vector<std::string>& columns = names_of(kind);
   CsvReader csv(in, name, columns);
-  if (csv.empty()) input_error("{}: expected a header with the columns {}", name, fmt::join(columns, ","));
+  if (csv.empty()) input_error("{}: expected a header with the columns {}", name, join(columns, ","));
   AngleRows rows(name, {"theta_i", "phi_i", "theta_o", "phi_o"}, {0, 2});
   std::size_t negative = 0;
   std::vector<double> row;
@@ -106,13 +108,13 @@ Measurement read_csv_grid(const std::filesystem::path& path) {
         "{}: theta_i, theta_o: expected degrees, and the largest is {}: name the columns {} for angles in radians, {} "
         "for such small ones",
         name, degrees(std::max(*rows.axis(0).rbegin(), *rows.axis(2).rbegin())),
-        fmt::join(names_of(Columns::Radians).begin(), names_of(Columns::Radians).begin() + 4, ","),
-        fmt::join(names_of(Columns::Degrees).begin(), names_of(Columns::Degrees).begin() + 4, ","));
+        join(names_of(Columns::Radians) | std::views::take(4), ","),
+        join(names_of(Columns::Degrees) | std::views::take(4), ","));
   Measurement out;
   if (!csv.others().empty())
     out.notes.push_back(fmt::format("{} not known and not read: {}",
                                     csv.others().size() == 1 ? "a column is" : "columns are",
-                                    fmt::join(csv.others(), ", ")));
+                                    join(csv.others(), ", ")));
   if (negative)
     out.notes.push_back(fmt::format("{} negative: taken for 0", counted(negative, "number is", "numbers are")));
   read_grid_of_directions(rows, out);

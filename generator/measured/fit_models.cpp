@@ -300,12 +300,12 @@ std::optional<std::string> order_of_fits(const std::vector<ModelFit>& fits) {
   if (mirrors) why.push_back("the order counts the light of a mirror as an error, which the column does not");
   if (parameters) why.push_back("of models that come about as close, those with fewer parameters stand first");
   if (why.empty()) return std::nullopt;
-  return fmt::to_string(fmt::join(why, "; "));
+  return join(why, "; ");
 }
 
 std::string remarks(const ModelFit& f) {
   std::string out;
-  if (!f.stopped.empty()) out += fmt::format("; stopped at the end of the range of {}", fmt::join(f.stopped, ", "));
+  if (!f.stopped.empty()) out += fmt::format("; stopped at the end of the range of {}", join(f.stopped, ", "));
   if (f.turned)
     out += fmt::format("; {} % if the data were turned by {:.1f} degrees about the normal", in_percent(f.turned->error),
                        f.turned->angle * 180 / kPi);

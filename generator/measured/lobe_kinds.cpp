@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "core/text.h"
+
 namespace brdfc::measured {
 namespace {
 
@@ -106,7 +108,7 @@ std::vector<LobeKind> lobe_kinds(const std::vector<std::string>& names, bool iso
       std::vector<std::string> known;
       for (const KindRow& row : rows())
         if (known.empty() || known.back() != row.model) known.emplace_back(row.model);
-      input_error("{} has no lobe for a sum, expected all or some of {}", name, fmt::join(known, ", "));
+      input_error("{} has no lobe for a sum, expected all or some of {}", name, join(known, ", "));
     }
   }
   std::vector<LobeKind> out;

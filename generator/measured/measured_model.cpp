@@ -24,39 +24,6 @@ class MeasuredBrdf final : public OpaqueBrdf {
   std::shared_ptr<const Sampler> sampling_;
 };
 
-template <class T> void set(Rgb<T>& to, std::size_t lane, const Rgb<double>& value) {
-  to.r[lane] = value.r, to.g[lane] = value.g, to.b[lane] = value.b;
-}
-Vec3<double> get(const Vec3<Pack>& v, std::size_t lane) { return {v.x[lane], v.y[lane], v.z[lane]}; }
-
-/// Looks eight directions up, one after the other: reading a table is not computing.
-class PackedMeasured final : public OpaquePacked {
- public:
-  explicit PackedMeasured(std::unique_ptr<Brdf<double>> brdf) : brdf_(std::move(brdf)) {}
-  PackedEvaluation evaluate(const Vec3<Pack>& wi, const Vec3<Pack>& wo) const override {
-    PackedEvaluation out{Rgb<Pack>(Pack(0)), Pack(0)};
-    for (std::size_t k = 0; k < kLanes; ++k) {
-      set(out.f, k, brdf_->eval(get(wi, k), get(wo, k)));
-      out.pdf[k] = brdf_->pdf(get(wi, k), get(wo, k));
-    }
-    return out;
-  }
-  Sample<Pack> sample(const Vec3<Pack>& wo, const Vec3<Pack>& u) const override {
-    Sample<Pack> out{{Pack(0), Pack(0), Pack(1)}, Rgb<Pack>(Pack(0)), Pack(0)};
-    for (std::size_t k = 0; k < kLanes; ++k) {
-      const Sample<double> s = brdf_->sample(get(wo, k), get(u, k));
-      out.wi.x[k] = s.wi.x, out.wi.y[k] = s.wi.y, out.wi.z[k] = s.wi.z;
-      set(out.weight, k, s.weight);
-      out.pdf[k] = s.pdf;
-    }
-    return out;
-  }
-  Rgb<Pack> mirror(const Vec3<Pack>&) const override { return Rgb<Pack>(Pack(0)); }
-
- private:
-  std::unique_ptr<Brdf<double>> brdf_;
-};
-
 /// The mean over some views of the second moment of samples' weights, relative to the square of their mean.
 double second_moment(const Table& table, const Sampler& sampler) {
   constexpr int kViews = 6, kSamples = 512;
@@ -98,7 +65,7 @@ std::unique_ptr<Brdf<double>> MeasuredModel::make_double(const ParamValues&) con
   return std::make_unique<MeasuredBrdf>(table_, sampling_);
 }
 std::unique_ptr<PackedBrdf> MeasuredModel::make_packed(const ParamValues& values) const {
-  return std::make_unique<PackedMeasured>(make_double(values));
+  return one_by_one([&] { return make_double(values); });  // reading a table is not computing
 }
 
 }  // namespace brdfc::measured

@@ -5,6 +5,7 @@
 #include <cctype>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "measured/alta.h"
 #include "measured/csv_grid.h"
 #include "measured/merl.h"
@@ -26,7 +27,7 @@ Measurement read(const std::filesystem::path& path, const ToRgb& to_rgb) {
   if (extension == ".xml") return read_radiance(path);
   if (extension == ".csv") return read_csv_grid(path);
   input_error("{}: expected a name that ends with one of {}: MERL, RGL, UTIA, ALTA, Radiance or a table", path.string(),
-              fmt::join(kExtensions, ", "));
+              join(kExtensions, ", "));
 }
 
 }  // namespace

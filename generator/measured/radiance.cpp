@@ -133,8 +133,7 @@ Patches patches_of(const File& file, const std::string& name, std::size_t number
   }
   if (published.empty())
     input_error("{}: expected an AngleBasis with AngleBasisBlocks for '{:.60}', or one of {}; the file describes {}",
-                file.name, name, fmt::join(known, ", "),
-                names.empty() ? "none" : fmt::to_string(fmt::join(names, ", ")));
+                file.name, name, join(known, ", "), names.empty() ? "none" : join(names, ", "));
   const auto fits = [&](const Patches* patches) { return patches->size() * patches->size() == numbers; };
   const auto number_fitting = std::ranges::count_if(published, fits);
   const Patches& out = number_fitting ? **std::ranges::find_if(published, fits) : *published[0];
@@ -143,7 +142,7 @@ Patches patches_of(const File& file, const std::string& name, std::size_t number
     for (const Patches::Ring& ring : out.rings()) ends.push_back(ring.to);
     notes.push_back(
         fmt::format("{} is not described: taken for that of Radiance since July 2022, with rings up to {} degrees",
-                    out.name(), fmt::join(ends, ", ")));
+                    out.name(), join(ends, ", ")));
   }
   return out;
 }
@@ -353,7 +352,7 @@ Chosen choose(const File& file, const std::array<const char*, 2>& colours, std::
     std::vector<std::string> found;
     for (const Block& block : file.blocks) found.push_back(block.wavelength + ", " + block.direction);
     input_error("{}: expected WavelengthData Visible, Reflection Front or Reflection Back, found {:.300}", file.name,
-                found.empty() ? "none" : fmt::to_string(fmt::join(found, "; ")));
+                found.empty() ? "none" : join(found, "; "));
   }
   const std::string& direction = out.luminance->direction;
   for (std::size_t k = 0; k < 2; ++k) out.colours[k] = file.find(colours[k], direction);
@@ -376,9 +375,8 @@ Chosen choose(const File& file, const std::array<const char*, 2>& colours, std::
       add(directions, block.direction);
   }
   for (std::string& wavelength : wavelengths) directions.push_back("the data for " + wavelength);
-  notes.push_back(direction + (directions.empty() ? " is read"
-                                                  : fmt::format(" is read, not {:.300}",
-                                                                fmt::to_string(fmt::join(directions, ", ")))));
+  notes.push_back(direction +
+                  (directions.empty() ? " is read" : fmt::format(" is read, not {:.300}", join(directions, ", "))));
   return out;
 }
 
@@ -394,7 +392,7 @@ Measurement read_radiance(const std::filesystem::path& path) {
   std::vector<std::string> description;
   for (const char* name : {"Name", "Manufacturer"})
     if (std::string text = text_of(material, name); !text.empty()) description.push_back(std::move(text));
-  out.description = fmt::to_string(fmt::join(description, ", "));
+  out.description = join(description, ", ");
   const std::string structure = text_of(file.layer.child("DataDefinition"), "IncidentDataStructure");
   const bool columns = same_name(structure, "Columns");
   if (columns || same_name(structure, "Rows"))

@@ -242,7 +242,7 @@ Measurement read_rgl(const std::filesystem::path& path, const ToRgb& to_rgb) {
   if (shape[0] != table->phis.size() || shape[1] != table->thetas.size() || shape[2] != channels || width < 2 ||
       height < 2)
     file.fail(field, fmt::format("{} x {} x {} x n x n numbers, n at least 2, got {}", table->phis.size(),
-                                 table->thetas.size(), channels, fmt::join(shape, " x ")));
+                                 table->thetas.size(), channels, join(shape, " x ")));
   // The conversion of spectra is linear, as interpolation is, so it may come first.
   std::array<std::vector<float>, 3> planes;
   {

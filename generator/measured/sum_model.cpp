@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/sequence.h"
+#include "core/text.h"
 #include "measure/albedo.h"
 #include "model/sampling.h"
 
@@ -203,7 +204,7 @@ SumModel::SumModel(std::vector<Lobe> lobes, Stack stack)
     info_.properties.reciprocal &= each.properties.reciprocal && stack == Stack::Sum;
     info_.properties.isotropic &= each.properties.isotropic;
   }
-  info_.doc = fmt::format("{}", fmt::join(names, stack == Stack::Layers ? " over " : " + "));
+  info_.doc = join(names, stack == Stack::Layers ? " over " : " + ");
   info_.properties.conserving = info_.properties.exact_sampling = false;
   views_ = std::make_shared<Views>(terms_of(lobes_), stack);
 }

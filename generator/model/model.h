@@ -21,6 +21,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -111,9 +112,10 @@ struct PackedFormulas {
   void (*transmit)(const void* model, const void* wo, void* weight);                      ///< to an Rgb<Pack>
   void (*transmittance)(const void* model, const void* distance, void* share);            ///< to an Rgb<Pack>
 };
-/// The formulas that are fastest on this machine's processor.
-const PackedFormulas* fastest(const PackedFormulas* baseline, const PackedFormulas* x86_64_v3,
-                              const PackedFormulas* x86_64_v4);
+/// The formulas that are fastest on this machine's processor; null if it can run neither.
+const PackedFormulas* fastest(const PackedFormulas* x86_64_v3, const PackedFormulas* x86_64_v4);
+/// A model that evaluates eight directions one after the other, each with a model of its own that `make` returns.
+std::unique_ptr<PackedBrdf> one_by_one(const std::function<std::unique_ptr<Brdf<double>>()>& make);
 
 /// A registered model.
 class Model {
@@ -462,9 +464,9 @@ template <template <class> class M> class PackedOf final : public PackedBrdf {
 
 template <template <class> class M> class ModelOf final : public Model {
  public:
-  /// `formulas` are those for a further instruction set, if the model is compiled for any.
+  /// `formulas` are null if the model is compiled for further instruction sets, and the processor has none of them.
   explicit ModelOf(const PackedFormulas* formulas = &kPackedFormulas<M>)
-      : info_(M<double>::info()), packed_formulas_(*formulas) {
+      : info_(M<double>::info()), packed_formulas_(formulas) {
     M<double> prototype;
     prototype.parameters(SchemaVisitor{info_.params});
   }
@@ -487,7 +489,8 @@ template <template <class> class M> class ModelOf final : public Model {
   std::unique_ptr<Brdf<float>> make_float(const ParamValues& v) const override { return make<float>(v); }
   std::unique_ptr<Brdf<Wide>> make_wide(const ParamValues& v) const override { return make<Wide>(v); }
   std::unique_ptr<PackedBrdf> make_packed(const ParamValues& v) const override {
-    return std::make_unique<PackedOf<M>>(bind<Pack>(v), packed_formulas_);
+    if (packed_formulas_ == nullptr) return one_by_one([&] { return make_double(v); });
+    return std::make_unique<PackedOf<M>>(bind<Pack>(v), *packed_formulas_);
   }
   std::unique_ptr<Brdf<Expr>> record(const ParamValues& fixed) const override {
     const ParamValues values = complete(info_, fixed);
@@ -507,7 +510,7 @@ template <template <class> class M> class ModelOf final : public Model {
     return std::make_unique<BrdfOf<M, T>>(bind<T>(v));
   }
   ModelInfo info_;
-  const PackedFormulas& packed_formulas_;
+  const PackedFormulas* packed_formulas_;
 };
 
 }  // namespace detail
@@ -521,17 +524,17 @@ template <template <class> class M> class ModelOf final : public Model {
   extern constinit const PackedFormulas M = ::brdfc::model::detail::kPackedFormulas<::brdfc::M>; \
   }
 #elif BRDFC_FURTHER_INSTRUCTION_SETS
-#define BRDFC_MODEL(M)                                                                                 \
-  namespace packed::x86_64_v3 {                                                                        \
-  extern const PackedFormulas M;                                                                       \
-  }                                                                                                    \
-  namespace packed::x86_64_v4 {                                                                        \
-  extern const PackedFormulas M;                                                                       \
-  }                                                                                                    \
-  bool only_one_model_has_the_class_##M = ::brdfc::register_model(                                     \
-      std::make_unique<::brdfc::model::detail::ModelOf<M>>(::brdfc::fastest(                           \
-          &::brdfc::model::detail::kPackedFormulas<M>, &packed::x86_64_v3::M, &packed::x86_64_v4::M)), \
-      __FILE_NAME__);
+#define BRDFC_MODEL(M)                                                                             \
+  namespace packed::x86_64_v3 {                                                                    \
+  extern const PackedFormulas M;                                                                   \
+  }                                                                                                \
+  namespace packed::x86_64_v4 {                                                                    \
+  extern const PackedFormulas M;                                                                   \
+  }                                                                                                \
+  bool only_one_model_has_the_class_##M =                                                          \
+      ::brdfc::register_model(std::make_unique<::brdfc::model::detail::ModelOf<M>>(                \
+                                  ::brdfc::fastest(&packed::x86_64_v3::M, &packed::x86_64_v4::M)), \
+                              __FILE_NAME__);
 #else
 #define BRDFC_MODEL(M)                    \
   bool only_one_model_has_the_class_##M = \

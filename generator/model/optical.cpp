@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/data_dir.h"
+#include "core/text.h"
 #include "model/optical_file.h"
 
 namespace brdfc::inline model {
@@ -173,8 +174,8 @@ Substance find_substance(const std::string& name, const fs::path& folder) {
     if (s.name == name) return s;
     known.push_back(s.name);
   }
-  input_error("expected a file NAME.csv, NAME.txt, NAME.yml or NAME.eta.spd, or one of {}, got '{}'",
-              fmt::join(known, ", "), name);
+  input_error("expected a file NAME.csv, NAME.txt, NAME.yml or NAME.eta.spd, or one of {}, got '{}'", join(known, ", "),
+              name);
 }
 
 OpticalValues optical_values(const Substance& s, const ToRgb& to_rgb) {

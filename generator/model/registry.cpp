@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <set>
 
+#include "core/text.h"
 #include "print/reserved.h"
 
 namespace brdfc::inline model {
@@ -59,7 +60,7 @@ void Registry::add(std::unique_ptr<Model> model, const std::string& file) {
 }
 
 const std::map<std::string, std::unique_ptr<Model>>& Registry::models() const {
-  if (!errors_.empty()) input_error("{}", fmt::join(errors_, "; "));
+  if (!errors_.empty()) input_error("{}", join(errors_, "; "));
   return models_;
 }
 

@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "core/nearest.h"
 #include "core/parse.h"
+#include "core/text.h"
 
 namespace brdfc::inline model {
 namespace {
@@ -96,7 +97,7 @@ ParamValues complete(const ModelInfo& info, const ParamValues& given) {
     std::vector<std::string> names;
     for (const ParamInfo& p : info.params) names.push_back(p.name);
     input_error("{}: unknown parameter '{}': {}expected one of {}", info.name, name, did_you_mean(name, names),
-                fmt::join(names, ", "));
+                join(names, ", "));
   }
   for (const ParamInfo& p : info.params) {
     const auto it = given.find(p.name);
@@ -131,7 +132,7 @@ ParamValues complete(const ModelInfo& info, const ParamValues& given) {
         if (it != given.end()) {
           const auto* s = std::get_if<std::string>(&it->second);
           if (!s || std::find(p.choices.begin(), p.choices.end(), *s) == p.choices.end())
-            input_error("{}: {}: expected one of {}, got '{}'", info.name, p.name, fmt::join(p.choices, ", "),
+            input_error("{}: {}: expected one of {}, got '{}'", info.name, p.name, join(p.choices, ", "),
                         s ? *s : "a number");
           text = *s;
         }

@@ -2,10 +2,10 @@
 #include "pack/brdf_files.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <set>
 
+#include "core/text.h"
 #include "model/choices.h"
 #include "pack/addon.h"
 #include "pack/recorded_model.h"
@@ -62,7 +62,7 @@ BrdfFiles brdf_files(const std::vector<const Model*>& models, const std::filesys
     const ModelInfo& info = model->info();
     for (const Choices& choices : choice_combinations(info)) {
       const std::vector<std::string> options = options_of(info, choices);
-      const std::string name = fmt::format("{}", fmt::join(options, "-"));
+      const std::string name = join(options, "-");
       const std::string full = name.empty() ? info.name : info.name + "-" + name;
       const RecordedModel recorded = record_model(*model, choices, Precision::Single);
       if (recorded.eval.outputs().empty()) {

@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/json_text.h"
+#include "core/text.h"
 #include "model/spectrum.h"
 #include "pack/addon.h"
 #include "pack/manifest.h"
@@ -110,7 +111,7 @@ Json described(const Model& model, print::Tables& tables) {
   GlslFunctions functions(model, tables);
   for (const Choices& choices : choice_combinations(info)) {
     const std::vector<std::string> options = options_of(info, choices);
-    const std::string key = fmt::format("{}", fmt::join(options, " "));
+    const std::string key = join(options, " ");
     std::string suffix;
     for (const std::string& option : options) suffix += "_" + option;
     formulas[key] = functions.add(choices, suffix);

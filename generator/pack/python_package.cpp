@@ -8,6 +8,7 @@
 
 #include "closures/closure.h"
 #include "core/error.h"
+#include "core/text.h"
 #include "model/optical.h"
 #include "pack/addon.h"
 #include "pack/recorded_model.h"
@@ -59,7 +60,7 @@ std::string described(const ParamInfo& p) {
       return fmt::format("{}: {}. A colour in [0, 1], default {:g}, {:g}, {:g}.", p.name, p.doc, p.value[0], p.value[1],
                          p.value[2]);
     default:
-      return fmt::format("{}: {}. One of {}, default {}.", p.name, p.doc, fmt::join(p.choices, ", "),
+      return fmt::format("{}: {}. One of {}, default {}.", p.name, p.doc, join(p.choices, ", "),
                          p.choices[std::size_t(p.value[0])]);
   }
 }
@@ -110,7 +111,7 @@ class NumpyFunctions {
         function("iors", suffix, iors, {}),
         function("inside", suffix, recorded.inside, {"distance"}),
     };
-    return fmt::format("Formulas({})", fmt::join(names, ", "));
+    return fmt::format("Formulas({})", join(names, ", "));
   }
 
   std::string print() const {

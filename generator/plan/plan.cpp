@@ -6,6 +6,7 @@
 #include <map>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "fit/fit.h"
 #include "fit/roles.h"
 
@@ -169,7 +170,7 @@ std::string under_lamps(const Form& form, const Budget& budget) {
   const int lamps = std::max(budget.lamps.value_or(0), int(budget.sizeless.size()));
   const std::string shine = form.under_sizeless_lamps(lamps, lamp_slots(budget));
   if (shine.empty() || budget.sizeless.empty()) return {};
-  return fmt::format("; {} without a size shines {}", fmt::join(budget.sizeless, ", "), shine);
+  return fmt::format("; {} without a size shines {}", join(budget.sizeless, ", "), shine);
 }
 
 /// Reason, as the end of a sentence, why a material can't have a form that it asks for; empty if it can. `needs`: all
@@ -193,7 +194,7 @@ void require_form(const MaterialNeed& need, const Needs& needs, const std::strin
   std::vector<std::string> has{"auto"};
   for (const Form* form : forms::forms())
     if (refusal(need, needs, *form).empty()) has.push_back(form->name());
-  input_error("{}: {} {}; it has {}", place, need.model->info().name, why, fmt::join(has, ", "));
+  input_error("{}: {} {}; it has {}", place, need.model->info().name, why, join(has, ", "));
 }
 
 Chosen chosen_form(const MaterialNeed& need, const Needs& needs, const Budget& budget) {
@@ -252,7 +253,7 @@ std::vector<FormChoice> choose_forms(const Needs& needs, const std::vector<Chose
     for (std::size_t i = 0; i < needs.size(); ++i)
       if (chosen[i].form == &form) users[chosen[i].why].push_back(needs[i]->id);
     for (const auto& [reason, ids] : users)
-      choice.why += fmt::format("{}{}: {}", choice.why.empty() ? "" : "; ", fmt::join(ids, ", "), reason);
+      choice.why += fmt::format("{}{}: {}", choice.why.empty() ? "" : "; ", join(ids, ", "), reason);
     choice.taken = !users.empty();
     if (!choice.taken && missing) {
       choice.exists = false;
@@ -341,8 +342,7 @@ PlannedModel plan_model(const Model& model, const Needs& needs, const Budget& bu
     unseen.push_back(fmt::format("below {:g}", first));
   if (const double last = std::ceil(degrees(plan.views.low)); last < 90)
     unseen.push_back(fmt::format("beyond {:g}", last));
-  if (!unseen.empty())
-    plan.reasons.push_back(fmt::format("view angles {} degrees: never seen", fmt::join(unseen, " and ")));
+  if (!unseen.empty()) plan.reasons.push_back(fmt::format("view angles {} degrees: never seen", join(unseen, " and ")));
   plan.fixed = constants(needs);
   for (const ParamInfo& p : info.params)
     if (const auto it = plan.fixed.find(p.name); it != plan.fixed.end())

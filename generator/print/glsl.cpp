@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 
+#include "core/text.h"
 #include "print/c_like_printer.h"
 #include "print/osl_text.h"
 
@@ -127,8 +128,7 @@ std::string glsl_function(const Program& program, const std::string& name, const
       taken.push_back(variable(outputs[k].first));
     }
   GlslPrinter printer(program, taken);
-  std::string out =
-      fmt::format("{} {}({}) {{\n", returns ? type_name(results[0]) : "void", name, fmt::join(heads, ", "));
+  std::string out = fmt::format("{} {}({}) {{\n", returns ? type_name(results[0]) : "void", name, join(heads, ", "));
   out += printer.statements(4);
   for (std::size_t k = 0; k < outputs.size(); ++k) {
     const int id = outputs[k].second;

@@ -7,6 +7,8 @@
 #include <set>
 #include <string_view>
 
+#include "core/text.h"
+
 namespace brdfc::print {
 bool is_python_word(const std::string& name) {
   static const std::set<std::string_view> words = {
@@ -188,7 +190,7 @@ std::string numpy_table(const Table& table) {
   std::vector<int> sizes;
   for (const TableAxis& a : table.axes) sizes.push_back(a.size());
   std::string out =
-      fmt::format("table_{} = table(({}{}), \"\"\"", table.name, fmt::join(sizes, ", "), sizes.size() == 1 ? "," : "");
+      fmt::format("table_{} = table(({}{}), \"\"\"", table.name, join(sizes, ", "), sizes.size() == 1 ? "," : "");
   std::size_t width = 200;
   for (double v : table.values) {
     const std::string s = fmt::format("{}", v);

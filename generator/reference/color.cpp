@@ -3,7 +3,6 @@
 
 #include <OpenColorIO/OpenColorIO.h>
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -15,6 +14,7 @@
 
 #include "core/data_dir.h"
 #include "core/error.h"
+#include "core/text.h"
 
 namespace brdfc::reference {
 
@@ -114,7 +114,7 @@ struct ColorConfig::Impl {
     const ocio::ConstColorSpaceRcPtr found = find(space);
     if (!found)
       input_error("{} has no colour space '{}', expected one of {}", of.file().string(), space,
-                  fmt::join(of.spaces(), ", "));
+                  join(of.spaces(), ", "));
     return found;
   }
 };
@@ -283,7 +283,7 @@ ToRgb ColorConfig::to_rec709() const {
 void ColorConfig::to_display(Image& image, const std::string& view) const {
   const std::vector<std::string> known = views();
   if (!view.empty() && std::find(known.begin(), known.end(), view) == known.end())
-    input_error("{} has no view '{}', expected one of {}", file_.string(), view, fmt::join(known, ", "));
+    input_error("{} has no view '{}', expected one of {}", file_.string(), view, join(known, ", "));
   const auto transform = ocio::DisplayViewTransform::Create();
   transform->setSrc(ocio::ROLE_SCENE_LINEAR);
   transform->setDisplay(impl_->config->getDefaultDisplay());

@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/process.h"
+#include "core/text.h"
 #include "pictures/pictures.h"
 #include "reference/color.h"
 
@@ -124,7 +125,7 @@ File read_file(const fs::path& path) {
       types.push_back(e);
       if (e == type) format = &f;
     }
-  if (!format) input_error("{}: expected an image file that ends in one of {}", path.string(), fmt::join(types, ", "));
+  if (!format) input_error("{}: expected an image file that ends in one of {}", path.string(), join(types, ", "));
   if (const Format* content = format_of_content(path); content != format)
     input_error("{}: not {} {} file, as its name says{}", path.string(), format->name[0] == 'O' ? "an" : "a",
                 format->name, content ? fmt::format(", but {}", content->name) : "");
@@ -191,10 +192,9 @@ std::string stated_working_space(const pictures::Header& header, const fs::path&
     if (id.empty() ? std::ranges::equal(*chromaticities, s.chromaticities, same) : id == s.interop_id) return s.name;
     names.push_back(s.name);
   }
-  if (!id.empty())
-    input_error("{}: its colours are in '{}', expected one of {}", path.string(), id, fmt::join(names, ", "));
+  if (!id.empty()) input_error("{}: its colours are in '{}', expected one of {}", path.string(), id, join(names, ", "));
   input_error("{}: its colours have the chromaticities {}, expected those of one of {}", path.string(),
-              fmt::join(*chromaticities, " "), fmt::join(names, ", "));
+              join(*chromaticities, " "), join(names, ", "));
 }
 
 /// The current configuration with the working space of a rendering.
@@ -215,7 +215,7 @@ std::optional<Chromaticities> stated_primaries(const pictures::Header& header, c
       known.push_back(s.interop_id);
     }
     input_error("{}: its colours are in '{}', expected one of {}, or a \"colorspace\" that says what they are",
-                path.string(), id, fmt::join(known, ", "));
+                path.string(), id, join(known, ", "));
   }
   Chromaticities stated;
   const auto numbers = header.numbers("chromaticities", stated.size());
@@ -227,7 +227,7 @@ std::optional<Chromaticities> stated_primaries(const pictures::Header& header, c
   if (!(std::abs(area) > 1e-6) || !(stated[7] > 0) ||
       !std::ranges::all_of(stated, [](float x) { return std::isfinite(x); }))
     input_error("{}: expected chromaticities of three primaries and a white, found {}", path.string(),
-                fmt::join(stated, " "));
+                join(stated, " "));
   return stated;
 }
 
@@ -289,7 +289,7 @@ Rendering read_rendering(const fs::path& path) {
                 path.string());
   const Channels color = find_channels(file.header);
   if (color.r < 0)
-    input_error("{}: expected channels R, G, B, found {}", path.string(), fmt::join(file.header.channels, ", "));
+    input_error("{}: expected channels R, G, B, found {}", path.string(), join(file.header.channels, ", "));
   Rendering rendering;
   rendering.mean = file.extract(color);
   const Channels variance{channel_index(file.header, "variance.R"), channel_index(file.header, "variance.G"),
@@ -361,7 +361,7 @@ Image read_image(const fs::path& path, const ColorConfig& colors, const std::str
   const Channels channels = find_channels(file.header);
   if (channels.r < 0)
     input_error("{}: expected channels R, G, B or one grey channel, found {}", path.string(),
-                fmt::join(file.header.channels, ", "));
+                join(file.header.channels, ", "));
   Image image = file.extract(channels);
   blacken_what_is_not_finite(image, path.string(), notes);
   if (space == "srgb" || (space == "auto" && !file.header.floating)) {

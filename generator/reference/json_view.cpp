@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "core/nearest.h"
+#include "core/text.h"
 
 namespace brdfc::reference {
 
@@ -87,7 +88,7 @@ void JsonView::only(const std::vector<std::string>& keys) const {
   if (!value_->is_object()) fail("an object");
   for (const auto& [name, value] : value_->items())
     if (std::find(keys.begin(), keys.end(), name) == keys.end())
-      child(value, name).error(fmt::format("unknown key, expected one of {}", fmt::join(keys, ", ")));
+      child(value, name).error(fmt::format("unknown key, expected one of {}", join(keys, ", ")));
 }
 
 JsonView JsonView::at(const std::string& key) const {
@@ -143,7 +144,7 @@ std::string JsonView::text() const {
 }
 
 std::string JsonView::choice(const std::vector<std::string>& choices) const {
-  const auto expected = [&] { return fmt::format("one of {}", fmt::join(choices, ", ")); };
+  const auto expected = [&] { return fmt::format("one of {}", join(choices, ", ")); };
   if (!value_->is_string()) fail(expected());
   const std::string s = value_->get<std::string>();
   if (std::find(choices.begin(), choices.end(), s) == choices.end())

@@ -2,7 +2,6 @@
 #include "reference/mesh_file.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +12,7 @@
 #include <unordered_map>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "core/vec.h"
 #include "reference/image.h"
 #include "reference/mesh.h"
@@ -241,7 +241,7 @@ Mesh read_mesh(const fs::path& path, bool smooth, const std::string& of_material
   for (const auto& [what, count] : file.left_out) others.push_back(counted(count, what));
   if (file.ends.empty())
     input_error("{}: expected at least one triangle, got {}{}{}", name, counted(file.positions.size(), "point"),
-                others.empty() ? "" : " and ", fmt::join(others, " and "));
+                others.empty() ? "" : " and ", join(others, " and "));
   std::vector<bool> of_faces(file.material_names.size(), false);
   bool unnamed = false;
   for (const std::int32_t m : file.materials) m < 0 ? unnamed = true : of_faces[std::size_t(m)] = true;
@@ -251,7 +251,7 @@ Mesh read_mesh(const fs::path& path, bool smooth, const std::string& of_material
   if (!of_material.empty() && !std::ranges::count(used, of_material))
     input_error(
         "{}: no face has the material '{}', expected {}", name, of_material,
-        used.empty() ? "no \"of_material\", for the file names none" : fmt::format("one of {}", fmt::join(used, ", ")));
+        used.empty() ? "no \"of_material\", for the file names none" : fmt::format("one of {}", join(used, ", ")));
 
   const std::vector<Triangle> all = triangulate(file);
   const auto taken = [&](const Triangle& t) {
@@ -311,7 +311,7 @@ Mesh read_mesh(const fs::path& path, bool smooth, const std::string& of_material
   std::string summary = counted(count, "triangle");
   if (!of_material.empty()) summary += fmt::format(" of the material '{}', of {} in all", of_material, all.size());
   if (without_area) others.insert(others.begin(), counted(without_area, "triangle without area"));
-  if (!others.empty()) summary += fmt::format("; left out: {}", fmt::join(others, ", "));
+  if (!others.empty()) summary += fmt::format("; left out: {}", join(others, ", "));
   note(summary);
   if (mesh.triangles.empty()) input_error("{}: expected at least one triangle, got {}", name, summary);
   if (bad_normals)
@@ -323,7 +323,7 @@ Mesh read_mesh(const fs::path& path, bool smooth, const std::string& of_material
     note(
         fmt::format("{} materials in the file ({}{}), all shown as the object's one; \"of_material\" in the shape "
                     "takes the faces of one of them",
-                    materials, fmt::join(used, ", "), unnamed ? " and one without a name" : ""));
+                    materials, join(used, ", "), unnamed ? " and one without a name" : ""));
   check_mesh(mesh, name);
   return mesh;
 }

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "core/text.h"
+
 namespace brdfc::reference {
 
 namespace fs = std::filesystem;
@@ -97,7 +99,7 @@ std::string SceneFiles::read_colorspace(const JsonView& j) const {
   std::vector<std::string> known{"auto", "linear", "srgb"};
   if (std::ranges::find(known, space) != known.end() || colors().has_space(space)) return space;
   for (const std::string& name : colors().spaces()) known.push_back(name);
-  v->fail(fmt::format("one of {}", fmt::join(known, ", ")));
+  v->fail(fmt::format("one of {}", join(known, ", ")));
 }
 
 }  // namespace brdfc::reference

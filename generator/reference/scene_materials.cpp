@@ -175,7 +175,7 @@ class MaterialReader {
     if (const ParamInfo* p = info.param(name)) return *p;
     std::vector<std::string> known;
     for (const ParamInfo& each : info.params) known.push_back(each.name);
-    value.error(fmt::format("{} has no such parameter, expected one of {}", info.name, fmt::join(known, ", ")));
+    value.error(fmt::format("{} has no such parameter, expected one of {}", info.name, join(known, ", ")));
   }
 
   static std::string described(const ModelInfo& info, const ParamValues& values) {
@@ -226,8 +226,7 @@ class MaterialReader {
       std::vector<std::string> each;
       for (const measured::Lobe& lobe : sum.lobes)
         each.push_back(lobe.model->info().name + " " + described(lobe.model->info(), lobe.values));
-      note_error("a sum of " + measured::counted(sum.lobes.size(), "lobe", "lobes"), sum.error,
-                 fmt::format("{}", fmt::join(each, " + ")));
+      note_error("a sum of " + measured::counted(sum.lobes.size(), "lobe", "lobes"), sum.error, join(each, " + "));
       if (const auto said = measured::gain_of_sum(sum.brightest)) files_.note(measurement.file + ": " + *said);
       set_stack(sum.lobes, measured::Stack::Sum, material, resolved);
       return;

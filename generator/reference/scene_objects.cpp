@@ -5,6 +5,7 @@
 #include <set>
 
 #include "core/json_text.h"
+#include "core/text.h"
 #include "reference/scene_files.h"
 #include "reference/shape_reader.h"
 
@@ -36,7 +37,7 @@ class ObjectReader {
     if (found == list.end()) {
       std::vector<std::string> known;
       for (const Material& m : list) known.push_back(m.id);
-      material.fail(fmt::format("one of the materials {}", fmt::join(known, ", ")));
+      material.fail(fmt::format("one of the materials {}", join(known, ", ")));
     }
     object.material = int(found - list.begin());
     if (!found->textures.empty() && object.mesh->uvs.empty())

@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "core/json_text.h"
+#include "core/text.h"
 #include "reference/image.h"
 #include "report/report.h"
 #include "report/verdict.h"
@@ -137,7 +138,7 @@ std::string report_csv(const std::vector<SceneReport>& scenes) {
   const auto equal_error = [&](const FormReport& f) {
     std::vector<std::string> fields(std::size(kEqualErrorAt));
     for (std::size_t i = 0; i < f.equal_error.size(); ++i) fields[i] = number(f.equal_error[i]);
-    return fmt::format("{}", fmt::join(fields, ","));
+    return join(fields, ",");
   };
   std::string out =
       "scene,form,rel_mse,noise_floor,bias,bias_standard_error,cost,spp,closures,relative_l1,"

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/hash.h"
+#include "core/text.h"
 
 namespace brdfc::inline trace {
 namespace {
@@ -58,7 +59,7 @@ std::string fingerprint(const Program& program) {
     std::vector<std::string> args;
     for (const int a : n.args) args.push_back(of[std::size_t(a)]);
     if (n.op == Op::Add || n.op == Op::Mul) std::ranges::sort(args);
-    of[id] = sha256(fmt::format("{} {}", text, fmt::join(args, " ")));
+    of[id] = sha256(fmt::format("{} {}", text, join(args, " ")));
   }
   std::string text;
   for (const auto& [name, id] : program.outputs()) text += fmt::format("{} {}\n", name, of[std::size_t(id)]);
