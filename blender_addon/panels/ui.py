@@ -19,11 +19,11 @@ from ..warnings.table import BUTTONS, MAKE_LOCAL, UNABLE
 from .labels import wrapped
 from .methods import METHODS
 
-#: Menu headings for the looks that models declare.
+#: Names of the submenus, by the look that models declare.
 LOOKS = {
     "matte": say("Matte"),
     "glossy": say("Glossy"),
-    "metal": say("Metal"),
+    "metal": say("Metals"),
     "glass": say("Glass"),
     "special": say("Special"),
 }
@@ -35,32 +35,51 @@ def menu_label(name):
     return f"{model.label} ({model.citation})"
 
 
-def _draw_models(layout, operator):
-    layout.operator("brdfc.search", icon="VIEWZOOM")
-    for look, names in pack.models_by_look().items():
-        layout.separator()
-        layout.label(text=iface(LOOKS[look]), translate=False)
-        for name in names:
-            # Names from the papers are not translated.
-            item = layout.operator(operator, text=menu_label(name), translate=False)
-            item.model = name
-            item.representation = "auto"
+def _draw_looks(menu, _context):
+    menu.layout.operator("brdfc.search", icon="VIEWZOOM")
+    menu.layout.separator()
+    for look in pack.models_by_look():
+        menu.layout.menu(f"{menu.bl_idname}_{look}")
+
+
+def _draw_models(menu, _context):
+    for name in pack.models_by_look()[menu.look]:
+        # Names from the papers are not translated.
+        text = menu_label(name)
+        item = menu.layout.operator(menu.operator, text=text, translate=False)
+        item.model = name
+        item.representation = "auto"
 
 
 class NODE_MT_brdfc(Menu):
     bl_idname = "NODE_MT_brdfc"
     bl_label = "brdfc"
-
-    def draw(self, context):
-        _draw_models(self.layout, "brdfc.add_node")
+    operator = "brdfc.add_node"
+    draw = _draw_looks
 
 
 class MATERIAL_MT_brdfc(Menu):
     bl_idname = "MATERIAL_MT_brdfc"
     bl_label = "New Reflection Model"
+    operator = "brdfc.new_material"
+    draw = _draw_looks
 
-    def draw(self, context):
-        _draw_models(self.layout, "brdfc.new_material")
+
+def _submenu(menu, look):
+    """The class of the submenu with the models of a look. Each is a class of its own, as Blender's
+    search visits a class once."""
+    name = f"{menu.bl_idname}_{look}"
+    members = {
+        "bl_idname": name,
+        "bl_label": LOOKS[look],
+        "operator": menu.operator,
+        "look": look,
+        "draw": _draw_models,
+    }
+    return type(name, (Menu,), members)
+
+
+_SUBMENUS = [_submenu(menu, look) for menu in (NODE_MT_brdfc, MATERIAL_MT_brdfc) for look in LOOKS]
 
 
 def draw_add_menu(self, context):
@@ -383,7 +402,13 @@ class NODE_PT_brdfc(_BrdfcPanel, Panel):
         return context.space_data.tree_type == "ShaderNodeTree" and _has_ours(context)
 
 
-_CLASSES = (NODE_MT_brdfc, MATERIAL_MT_brdfc, MATERIAL_PT_brdfc, NODE_PT_brdfc)
+_CLASSES = (
+    *_SUBMENUS,
+    NODE_MT_brdfc,
+    MATERIAL_MT_brdfc,
+    MATERIAL_PT_brdfc,
+    NODE_PT_brdfc,
+)
 _register, _unregister = bpy.utils.register_classes_factory(_CLASSES)
 _MENUS = (
     ("NODE_MT_category_shader_shader", draw_add_menu),
