@@ -280,8 +280,7 @@ def draw_node(layout, node, scene):
 
 def _lamps_seen_by(material, scene):
     """[slots.Lamp] as a material's nodes see them; one that is linked has the lamps of its file."""
-    groups = map(model_nodes.lamps_of_library, model_nodes.group_nodes(material))
-    return lamps.last_found(scene, next(filter(None, groups), None))
+    return lamps.last_found(scene, model_nodes.lamps_of_other_file(material))
 
 
 def draw_lamps(layout, material, scene):
