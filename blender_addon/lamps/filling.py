@@ -228,6 +228,15 @@ def last_found(scene, group=None):
     return _listed(survey, chosen, slots.elsewhere(group.library))
 
 
+def not_followed(scene, found):
+    """The lamps of a scene that its pictures show without noise, but not a viewport beside the
+    first window, if that has another scene. `found`: last_found() of the scene."""
+    if scene == current_scene():
+        return []
+    there = {lamp.name for lamp in memory.lamps if lamp.slot is not None}
+    return [lamp for lamp in found if lamp.slot is not None and lamp.name not in there]
+
+
 def count():
     """The number of lamps to aim at, in the scene of the open file with the most."""
     surveys = [_survey(scene, _depsgraph(scene)) for scene in bpy.data.scenes]

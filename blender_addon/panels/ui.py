@@ -278,11 +278,6 @@ def draw_node(layout, node, scene):
         layout.operator("brdfc.kernel", icon="FCURVE").node = model_nodes.key(node)
 
 
-def _lamps_seen_by(material, scene):
-    """[slots.Lamp] as a material's nodes see them; one that is linked has the lamps of its file."""
-    return lamps.last_found(scene, model_nodes.lamps_of_other_file(material))
-
-
 def draw_lamps(layout, material, scene):
     """Shows the lamps that the material's models aim at, if any of them does."""
     forms = [
@@ -294,13 +289,23 @@ def draw_lamps(layout, material, scene):
     if slots == 0:
         return
     box = layout.box()
-    found = _lamps_seen_by(material, scene)
+    # A material that is linked has the lamps of its file.
+    theirs = model_nodes.lamps_of_other_file(material)
+    found = lamps.last_found(scene, theirs)
     taken = [iface(lamp.name) for lamp in found if lamp.slot is not None and lamp.slot <= slots]
     if taken:
         said = say("Free of noise under {lamps}", lamps=", ".join(taken))
     else:
         said = say("Free of noise under no lamp yet")
     wrapped(box.column(align=True), said, "LIGHT")
+    if theirs is None and (missing := lamps.not_followed(scene, found)):
+        said = say(
+            "The viewport uses the lamps of {scene}, the scene of the first window, so {lamps} may "
+            "be noisy or missing there; pictures are right",
+            scene=lamps.current_scene().name,
+            lamps=", ".join(iface(lamp.name) for lamp in missing),
+        )
+        wrapped(box.column(align=True), said, "INFO")
     limit = closure_slots.lamps_that_fit()
     if limit is not None and limit[0] < min(slots, len(found)):
         room, largest = limit
