@@ -1714,7 +1714,7 @@ def test_disable_leaves_nothing_behind(extension, empty):
         if isinstance(value, type)
         and issubclass(value, bpy.types.bpy_struct)
         and value.__module__ == module.__name__
-    }
+    } | set(extension.ui._SUBMENUS)
     assert defined == set(classes) and len(classes) > 10
     handlers = {
         name: list(getattr(bpy.app.handlers, name))
