@@ -12,6 +12,7 @@ from pathlib import Path
 import bpy
 
 from .common.i18n import say
+from .common.jobs import Job
 from .common.program import ToolJob
 from .packs import pack
 
@@ -223,6 +224,46 @@ class Fitting(ToolJob):
             ) from bad
         finally:
             self._folder.cleanup()
+
+
+class Fittings(Job):
+    """Runs a Fitting of one file after the other; a file that is refused does not end the others.
+    The result is a Measured by path, and the errors by path."""
+
+    def __init__(self, paths, start):
+        """`start(path)` returns the Fitting of a file. A path that is given twice counts once."""
+        self.paths, self._start = list(dict.fromkeys(paths)), start
+        self._found, self._refusals, self._fitting = {}, {}, None
+
+    @property
+    def done(self):
+        """The number of files that were fitted or refused."""
+        return len(self._found) + len(self._refusals)
+
+    def step(self):
+        done = self.done
+        if done == len(self.paths):
+            self.result = self._found, self._refusals
+            return None
+        return (done + self._go_on(self.paths[done])) / len(self.paths)
+
+    def _go_on(self, path):
+        """Goes on with a file; returns the part of its work that is done."""
+        try:
+            if self._fitting is None:
+                self._fitting = self._start(path)
+            share = self._fitting.step()
+            if share is not None:
+                return share
+            self._found[path] = self._fitting.result
+        except MeasuredError as error:
+            self._refusals[path] = error
+        self._fitting = None
+        return 1
+
+    def cancel(self):
+        if self._fitting is not None:
+            self._fitting.cancel()
 
 
 def most_lobes(kind):

@@ -10,7 +10,7 @@ from .. import lamps
 from ..common.i18n import say
 from ..packs import pack
 from ..packs.parameter_values import choice_label
-from . import compiler, formula_nodes, stand_in, twin
+from . import compiler, formula_nodes, part_groups, stand_in, twin
 from .compiler import CompileError
 from .group_sockets import VECTORS, Interface, has_menus
 from .wiring import Wiring
@@ -83,6 +83,8 @@ def script_problem(group):
     """
     if _has_lost_groups(group):
         return "has lost a group inside it"
+    if part_groups.lacks_nodes(group):
+        return "has lost the nodes of a group inside it"
     if is_native(group):
         return None
     tag = group[TAG]

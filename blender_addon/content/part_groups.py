@@ -76,9 +76,28 @@ def is_part(group):
     return group.library is None and PART in group
 
 
+def _contains(group, sought, seen):
+    if group in sought:
+        return True
+    seen.add(group)
+    inner = {getattr(node, "node_tree", None) for node in group.nodes}
+    return any(_contains(each, sought, seen) for each in inner - seen if each is not None)
+
+
+def _emptied():
+    return {each for each in bpy.data.node_groups if not each.nodes}
+
+
+def lacks_nodes(group):
+    """Whether somebody has deleted all nodes of a group, or of one inside it."""
+    # To look at all groups of the file takes less time than to look at the nodes of one.
+    emptied = _emptied()
+    return bool(emptied) and _contains(group, emptied, set())
+
+
 def _find(digest, among=None):
     for group in bpy.data.node_groups if among is None else among:
-        if is_part(group) and group[PART] == digest:
+        if is_part(group) and group[PART] == digest and not lacks_nodes(group):
             return group
     return None
 
@@ -96,8 +115,10 @@ def _appended(digest):
 
 def merge_copies(made):
     """Replaces parts among groups that were just appended by equal parts that the file had."""
-    new = set(made)
+    new, emptied = set(made), _emptied()
     own = {g[PART]: g for g in bpy.data.node_groups if is_part(g) and g not in new}
+    if emptied:
+        own = {part: g for part, g in own.items() if not _contains(g, emptied, set())}
     # Nodes of these groups alone can use them. Blender's own function, user_remap, and the removal
     # of single groups examine the whole file for each group.
     extra = {group: own[group[PART]] for group in made if group.get(PART) in own}

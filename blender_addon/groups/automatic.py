@@ -98,8 +98,15 @@ def _before_save(*_):
     them each time that the file is opened. And it would keep what was painted on tables."""
     if not nodes.is_at_work():
         nodes.remove_unused_groups()
-        nodes.restore_tables()
+        _restore_tables()
     _now()
+
+
+def _restore_tables():
+    try:
+        _filled.update(group.session_uid for group in nodes.restore_tables())
+    except RuntimeError as error:  # CompileError: the file is saved with what was painted
+        print(f"brdfc: {of_error(error)[0]}")
 
 
 @persistent

@@ -125,6 +125,12 @@ def lamps_of_library(node):
     return next((g for g in inner if g is not None and lamps.is_group(g)), None)
 
 
+def lamps_of_other_file(material):
+    """The first shared group of another file that the nodes of a material read; None if there is
+    none."""
+    return next(filter(None, map(lamps_of_library, group_nodes(material))), None)
+
+
 def is_baked(node):
     """Whether the group was made for the open file alone; see lean.py."""
     return "baked" in node.node_tree[TAG]

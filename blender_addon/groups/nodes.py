@@ -345,19 +345,34 @@ def make_local(tree):
 
 
 def restore_tables():
-    """Makes the groups of Blender's own nodes anew whose tables were painted on."""
+    """Makes the groups anew whose tables were painted on. Returns those that adapt to the scene,
+    which were filled again."""
+    filled = []
     if not (painted := twin.painted_tables()):
-        return
+        return filled
     for group in [g for g in bpy.data.node_groups if TAG in g and g.library is None]:
         images = {n.image for n in group.nodes if n.bl_idname == "ShaderNodeTexImage"}
-        if not (images & painted and group_content.is_native(group)):
+        tag = group[TAG]
+        if not images & painted or not model_nodes.is_current(group) or "baked" in tag:
             continue
-        if not model_nodes.is_current(group) or "baked" in group[TAG]:
+        form = pack.model(tag["model"]).forms[tag["representation"]]
+        if AUTO in tag:
+            # Scripts can't be made beside those that a group has.
+            for step in dict.fromkeys([form.model.native_form, form]):
+                _change_form(group, step, lamps.room_needed)
+            filled.append(group)
             continue
-        form = pack.model(group[TAG]["model"]).forms[group[TAG]["representation"]]
-        group[TAG]["digest"] = ""  # so that another one is made
-        group.user_remap(_group_of(form, _room_of(group[TAG])))
+        tag["digest"] = ""  # so that another one is made
+        if group_content.is_native(group):
+            made = _group_of(form, _room_of(tag))
+        else:
+            made = ensure_group(form.model.name, form.name, albedo="albedo_inputs" in tag)
+        group.user_remap(made)
         remove_group(group)
+    for image in [i for i in bpy.data.images if i.library is None and twin.TABLE in i]:
+        if image.users == 0:
+            bpy.data.images.remove(image)
+    return filled
 
 
 def remove_group(group):

@@ -14,6 +14,7 @@ from .filling import (
     ensure_group,
     follow,
     last_found,
+    not_followed,
     refresh,
     room_needed,
 )
@@ -59,6 +60,7 @@ __all__ = [
     "kind_of",
     "lamps_of",
     "last_found",
+    "not_followed",
     "part_names",
     "refresh",
     "register",

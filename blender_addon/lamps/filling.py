@@ -133,6 +133,8 @@ def _fill(scene, depsgraph, subject=None, keep=True):
     survey = _survey(scene, depsgraph, subject)
     budget = budget_of_file()
     group = shared_group.deduplicate()
+    if group:
+        shared_group.mend(group)
     now = shared_group.written(group) if group else []
     chosen = _arranged(
         _worth_aiming(survey)[: budget.lamps()], _by_slot(now) if group and keep else []
@@ -174,12 +176,14 @@ def _depsgraph(scene):
 
 
 def ensure_group():
-    """The shared group; if the file has none, it is made and filled from the window's scene."""
+    """The shared group; if the file has none, or somebody has deleted nodes of it, it is made and
+    filled from the window's scene."""
     group = shared_group.find()
-    if group is None:
-        group = shared_group.make()
-        if scene := current_scene():
-            _fill(scene, depsgraph=_depsgraph(scene))
+    if group is not None and shared_group.is_whole(group):
+        return group
+    group = group or shared_group.make()
+    if scene := current_scene():
+        _fill(scene, depsgraph=_depsgraph(scene))
     return group
 
 
@@ -226,6 +230,15 @@ def last_found(scene, group=None):
     there = [slots.decoded(numbers) for numbers in _by_slot(shared_group.written(group))]
     chosen = [c for c in worth if any(slots.is_same_lamp(c.values, slot) for slot in there)]
     return _listed(survey, chosen, slots.elsewhere(group.library))
+
+
+def not_followed(scene, found):
+    """The lamps of a scene that its pictures show without noise, but not a viewport beside the
+    first window, if that has another scene. `found`: last_found() of the scene."""
+    if scene == current_scene():
+        return []
+    there = {lamp.name for lamp in memory.lamps if lamp.slot is not None}
+    return [lamp for lamp in found if lamp.slot is not None and lamp.name not in there]
 
 
 def count():

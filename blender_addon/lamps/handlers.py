@@ -49,14 +49,10 @@ def _is_limited_anew(updates):
 @persistent
 def _after_update(scene, depsgraph):
     # While another scene renders, its lamps must not be replaced by those of the window's scene.
-    if (
-        filling.memory.busy
-        or _rendering
-        or shared_group.find() is None
-        or scene != filling.current_scene()
-    ):
+    group = shared_group.find()
+    if filling.memory.busy or _rendering or group is None or scene != filling.current_scene():
         return
-    if filling.memory.scene != scene.session_uid:
+    if filling.memory.scene != scene.session_uid or not shared_group.is_whole(group):
         filling.quietly(scene, depsgraph)
         return
     updates = list(depsgraph.updates)

@@ -11,6 +11,7 @@ from . import slots
 #: identifies it.
 GROUP = ".brdfc Lamps"
 TAG = "brdfc_lamps"
+_NAMES = slots.part_names(slots.SLOTS)
 
 
 def make():
@@ -18,16 +19,35 @@ def make():
     group = bpy.data.node_groups.new(GROUP, "ShaderNodeTree")
     group[TAG] = 1
     group.description = "The lamps that materials of brdfc use. Updated by brdfc"
+    for name in _NAMES:
+        group.interface.new_socket(name, in_out="OUTPUT", socket_type="NodeSocketVector")
+    _add_nodes(group)
+    return group
+
+
+def _add_nodes(group):
     end = group.nodes.new("NodeGroupOutput")
     end.location = (300, 0)
-    for index, name in enumerate(slots.part_names(slots.SLOTS)):
-        group.interface.new_socket(name, in_out="OUTPUT", socket_type="NodeSocketVector")
+    for index, name in enumerate(_NAMES):
         node = group.nodes.new("ShaderNodeCombineXYZ")
         node.name = node.label = name
         node.hide = True
         node.location = (0, -40 * index)
         group.links.new(node.outputs[0], end.inputs[name])
-    return group
+
+
+def is_whole(group):
+    """Whether a shared group has all nodes that it was made with."""
+    nodes = {node.name: node.bl_idname for node in group.nodes}
+    return nodes.keys() >= {*_NAMES} and "NodeGroupOutput" in nodes.values()
+
+
+def mend(group):
+    """Makes the nodes of a shared group anew if somebody has deleted some of them. Drivers find
+    theirs by name."""
+    if not is_whole(group):
+        group.nodes.clear()
+        _add_nodes(group)
 
 
 def is_shared(group):
@@ -73,7 +93,7 @@ def deduplicate():
 def sockets(group):
     """[(socket, data path)] of the numbers of all slots, twelve per slot."""
     found = []
-    for name in slots.part_names(slots.SLOTS):
+    for name in _NAMES:
         for index, socket in enumerate(group.nodes[name].inputs):
             found.append((socket, _path(name, index)))
     return found

@@ -21,7 +21,7 @@ from ..common.i18n import say
 from ..common.jobs import Job, ProgramJob
 from ..common.program import find
 from ..content import kept_groups
-from ..measured import ENDINGS, SUM, Fitting, MeasuredError
+from ..measured import ENDINGS, SUM, Fitting, Fittings, MeasuredError
 from ..packs import pack
 from . import (
     BLEND,
@@ -83,7 +83,7 @@ class Making(Job):
                 say("No file in {folder} ends with {endings}", folder=folder, endings=endings)
             )
         find(MeasuredError)
-        self._found, self._refusals, self._fitting, self._building = {}, {}, None, None
+        self._fits, self._building = Fittings(self._files, self._fitting), None
 
     def _hidden(self, path):
         return any(part.startswith(".") for part in path.relative_to(self._root).parts)
@@ -93,28 +93,19 @@ class Making(Job):
             return None
         if self._building is not None:
             return self._build()
-        done = len(self._found) + len(self._refusals)
-        if done == len(self._files):
-            if not self._found:
-                raise self._nothing()
-            self._building = _Building(self._entries())
-            return _FITS
-        return _FITS * (done + self._fit(self._files[done])) / len(self._files)
+        share = self._fits.step()
+        if share is not None:
+            return _FITS * share
+        self._found, errors = self._fits.result
+        self._refusals = {path: error.args[0] for path, error in errors.items()}
+        if not self._found:
+            raise self._nothing()
+        self._building = _Building(self._entries())
+        return _FITS
 
-    def _fit(self, path):
-        """Goes on with a file; returns the part of its work that is done."""
-        try:
-            if self._fitting is None:
-                models = {None: "all", SUM: "none"}.get(self._model, self._model)
-                self._fitting = Fitting(path, models, sums=self._model == SUM)
-            share = self._fitting.step()
-            if share is not None:
-                return share
-            self._found[path] = self._fitting.result
-        except MeasuredError as error:
-            self._refusals[path] = error.args[0]
-        self._fitting = None
-        return 1
+    def _fitting(self, path):
+        models = {None: "all", SUM: "none"}.get(self._model, self._model)
+        return Fitting(path, models, sums=self._model == SUM)
 
     def _build(self):
         share = self._building.step()
@@ -194,9 +185,9 @@ class Making(Job):
         return PurePosixPath(NAME, MEASURED, inside)
 
     def cancel(self):
-        for job in (self._fitting, self._building):
-            if job is not None:
-                job.cancel()
+        self._fits.cancel()
+        if self._building is not None:
+            self._building.cancel()
 
 
 def _description(found, remarks=()):

@@ -121,14 +121,14 @@ class ModalJob:
 
 
 class ModalJobOnPath(ModalJob):
-    """A ModalJob that asks for a file or a folder, if `path`, the name of that property, is empty.
-    start() returns the job for it."""
+    """A ModalJob that asks for files or a folder, if none of the properties for them is set, whose
+    names are in `given`. start() returns the job for them."""
 
     #: A job for the next run: an operator that its file browser executes can't become modal.
     _started = None
 
     def invoke(self, context, event):
-        if not getattr(self, self.path):
+        if not any(getattr(self, name) for name in self.given):
             context.window_manager.fileselect_add(self)
             self.browsed = True
             return {"RUNNING_MODAL"}
@@ -137,6 +137,10 @@ class ModalJobOnPath(ModalJob):
             return self.begin(context, job or self.start())
         except ERRORS as error:
             return refused(self, error)
+
+    def arguments(self):
+        """What the file browser has set, for another call of the operator."""
+        return {name: getattr(self, name) for name in self.given}
 
     def begin_browsed(self):
         """For execute(): the result if the file browser has called it, otherwise None."""
@@ -150,7 +154,7 @@ class ModalJobOnPath(ModalJob):
         try:
             category, name = cls.bl_idname.split(".")
             operator = getattr(getattr(bpy.ops, category), name)
-            return operator("INVOKE_DEFAULT", **{self.path: getattr(self, self.path)})
+            return operator("INVOKE_DEFAULT", **self.arguments())
         finally:
             if cls._started is not None:  # refused
                 cls._started.cancel()

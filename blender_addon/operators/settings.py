@@ -6,6 +6,7 @@ from bpy.types import Operator
 from .. import api
 from ..common.i18n import rpt, say
 from ..common.interface import material_of
+from ..groups import model_nodes
 from ..warnings import checks
 from .common import ChangesActiveMaterial, OfActiveMaterial, refused
 
@@ -71,6 +72,15 @@ class BRDFC_OT_find_lamps(Operator):
                 say("Lamps that leave little noise: {taken} of {all}", taken=taken, all=len(found))
             ),
         )
+        material = material_of(context)
+        theirs = model_nodes.lamps_of_other_file(material) if material is not None else None
+        if theirs is not None:
+            said = say(
+                "{material!r} uses the lamps of {file}, from which it is linked: Make Local first",
+                material=material.name,
+                file=theirs.library.filepath,
+            )
+            self.report({"WARNING"}, rpt(said))
         return {"FINISHED"}
 
 

@@ -94,10 +94,10 @@ def model(name):
 
 
 def models_by_look():
-    """{look: identifiers of models}, both in the order of menus; looks without a model are left
-    out."""
+    """{look: identifiers of models}, the models in the order of their labels; looks without a model
+    are left out."""
     names = {look: [] for look in manifest()["looks"]}
-    for name in model_names():
+    for name in sorted(model_names(), key=lambda name: model(name).label.casefold()):
         names[model(name).look].append(name)
     return {look: found for look, found in names.items() if found}
 

@@ -19,11 +19,11 @@ from ..warnings.table import BUTTONS, MAKE_LOCAL, UNABLE
 from .labels import wrapped
 from .methods import METHODS
 
-#: Menu headings for the looks that models declare.
+#: Names of the submenus, by the look that models declare.
 LOOKS = {
     "matte": say("Matte"),
     "glossy": say("Glossy"),
-    "metal": say("Metal"),
+    "metal": say("Metals"),
     "glass": say("Glass"),
     "special": say("Special"),
 }
@@ -35,32 +35,51 @@ def menu_label(name):
     return f"{model.label} ({model.citation})"
 
 
-def _draw_models(layout, operator):
-    layout.operator("brdfc.search", icon="VIEWZOOM")
-    for look, names in pack.models_by_look().items():
-        layout.separator()
-        layout.label(text=iface(LOOKS[look]), translate=False)
-        for name in names:
-            # Names from the papers are not translated.
-            item = layout.operator(operator, text=menu_label(name), translate=False)
-            item.model = name
-            item.representation = "auto"
+def _draw_looks(menu, _context):
+    menu.layout.operator("brdfc.search", icon="VIEWZOOM")
+    menu.layout.separator()
+    for look in pack.models_by_look():
+        menu.layout.menu(f"{menu.bl_idname}_{look}")
+
+
+def _draw_models(menu, _context):
+    for name in pack.models_by_look()[menu.look]:
+        # Names from the papers are not translated.
+        text = menu_label(name)
+        item = menu.layout.operator(menu.operator, text=text, translate=False)
+        item.model = name
+        item.representation = "auto"
 
 
 class NODE_MT_brdfc(Menu):
     bl_idname = "NODE_MT_brdfc"
     bl_label = "brdfc"
-
-    def draw(self, context):
-        _draw_models(self.layout, "brdfc.add_node")
+    operator = "brdfc.add_node"
+    draw = _draw_looks
 
 
 class MATERIAL_MT_brdfc(Menu):
     bl_idname = "MATERIAL_MT_brdfc"
     bl_label = "New Reflection Model"
+    operator = "brdfc.new_material"
+    draw = _draw_looks
 
-    def draw(self, context):
-        _draw_models(self.layout, "brdfc.new_material")
+
+def _submenu(menu, look):
+    """The class of the submenu with the models of a look. Each is a class of its own, as Blender's
+    search visits a class once."""
+    name = f"{menu.bl_idname}_{look}"
+    members = {
+        "bl_idname": name,
+        "bl_label": LOOKS[look],
+        "operator": menu.operator,
+        "look": look,
+        "draw": _draw_models,
+    }
+    return type(name, (Menu,), members)
+
+
+_SUBMENUS = [_submenu(menu, look) for menu in (NODE_MT_brdfc, MATERIAL_MT_brdfc) for look in LOOKS]
 
 
 def draw_add_menu(self, context):
@@ -259,12 +278,6 @@ def draw_node(layout, node, scene):
         layout.operator("brdfc.kernel", icon="FCURVE").node = model_nodes.key(node)
 
 
-def _lamps_seen_by(material, scene):
-    """[slots.Lamp] as a material's nodes see them; one that is linked has the lamps of its file."""
-    groups = map(model_nodes.lamps_of_library, model_nodes.group_nodes(material))
-    return lamps.last_found(scene, next(filter(None, groups), None))
-
-
 def draw_lamps(layout, material, scene):
     """Shows the lamps that the material's models aim at, if any of them does."""
     forms = [
@@ -276,13 +289,23 @@ def draw_lamps(layout, material, scene):
     if slots == 0:
         return
     box = layout.box()
-    found = _lamps_seen_by(material, scene)
+    # A material that is linked has the lamps of its file.
+    theirs = model_nodes.lamps_of_other_file(material)
+    found = lamps.last_found(scene, theirs)
     taken = [iface(lamp.name) for lamp in found if lamp.slot is not None and lamp.slot <= slots]
     if taken:
         said = say("Free of noise under {lamps}", lamps=", ".join(taken))
     else:
         said = say("Free of noise under no lamp yet")
     wrapped(box.column(align=True), said, "LIGHT")
+    if theirs is None and (missing := lamps.not_followed(scene, found)):
+        said = say(
+            "The viewport uses the lamps of {scene}, the scene of the first window, so {lamps} may "
+            "be noisy or missing there; pictures are right",
+            scene=lamps.current_scene().name,
+            lamps=", ".join(iface(lamp.name) for lamp in missing),
+        )
+        wrapped(box.column(align=True), said, "INFO")
     limit = closure_slots.lamps_that_fit()
     if limit is not None and limit[0] < min(slots, len(found)):
         room, largest = limit
@@ -383,7 +406,13 @@ class NODE_PT_brdfc(_BrdfcPanel, Panel):
         return context.space_data.tree_type == "ShaderNodeTree" and _has_ours(context)
 
 
-_CLASSES = (NODE_MT_brdfc, MATERIAL_MT_brdfc, MATERIAL_PT_brdfc, NODE_PT_brdfc)
+_CLASSES = (
+    *_SUBMENUS,
+    NODE_MT_brdfc,
+    MATERIAL_MT_brdfc,
+    MATERIAL_PT_brdfc,
+    NODE_PT_brdfc,
+)
 _register, _unregister = bpy.utils.register_classes_factory(_CLASSES)
 _MENUS = (
     ("NODE_MT_category_shader_shader", draw_add_menu),

@@ -8,8 +8,8 @@ from .rows import when
 
 
 def damaged(at):
-    """The node's group lacks its script, its compiled code, one of its sockets or a group inside
-    it."""
+    """The node's group lacks its script, its compiled code, one of its sockets, a group inside it,
+    or all nodes of such a group."""
     problem = nodes.script_problem(at.node.node_tree)
     return when(problem, problem=problem)
 

@@ -6,6 +6,7 @@ folders are temporary, so nothing of the user's is touched. BRDFC_ANSWERS may na
 results of the tool are cached, as runs in several versions of Blender need the same ones.
 """
 
+import contextlib
 import json
 import os
 import shlex
@@ -198,3 +199,25 @@ def use_pack(extension, lean_pack):
 def convert(extension, empty):
     extension.scene_loader.apply_clean_settings(empty)
     return import_module(f"{extension.package}.convert")
+
+
+@pytest.fixture
+def manager():
+    """Replaces what modal operators use of Blender's windows, and records what they report."""
+    told = []
+    window_manager = SimpleNamespace(
+        event_timer_add=lambda step, window: told.append("timer") or "timer",
+        event_timer_remove=lambda timer: told.append("no timer"),
+        progress_begin=lambda low, high: told.append("begin"),
+        progress_update=lambda share: told.append(share),
+        progress_end=lambda: told.append("end"),
+        modal_handler_add=lambda operator: told.append("modal"),
+        windows=["window"],
+    )
+    context = SimpleNamespace(
+        window_manager=window_manager,
+        window=None,
+        workspace=SimpleNamespace(status_text_set=lambda text: told.append(text)),
+        temp_override=lambda window: contextlib.nullcontext(),
+    )
+    return SimpleNamespace(context=context, told=told)

@@ -3,6 +3,7 @@
 
 import contextlib
 import csv
+import inspect
 import io
 import json
 import os
@@ -412,6 +413,20 @@ def modules_of_operators(extension):
     """The modules that define operators, one file per subject."""
     prefix = f"{extension.operators.__name__}."
     return [module for name, module in sys.modules.items() if name.startswith(prefix)]
+
+
+class Stand:
+    """Replaces an operator; records what it reports."""
+
+    def __init__(self, operator):
+        self.reports, self.kind = [], operator
+
+    def report(self, kind, text):
+        self.reports.append((kind, text))
+
+    def __getattr__(self, name):
+        found = getattr(self.kind, name)
+        return found.__get__(self) if inspect.isfunction(found) else found
 
 
 class Layout:

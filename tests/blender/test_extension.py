@@ -1231,7 +1231,14 @@ def test_saved_file_renders_without_the_extension(every_form, tmp_path):
 
 # Menus, panels, operators
 
-LOOKS = ("Matte", "Glossy", "Metal", "Glass", "Special")
+#: Names of the submenus, by what models declare.
+LOOKS = {
+    "matte": "Matte",
+    "glossy": "Glossy",
+    "metal": "Metals",
+    "glass": "Glass",
+    "special": "Special",
+}
 
 
 @contextlib.contextmanager
@@ -1258,27 +1265,40 @@ def test_add_menu_lists_every_model(extension, empty):
     layout = helpers.Layout()
     extension.ui.draw_add_menu(SimpleNamespace(layout=layout), bpy.context)
     assert layout.log == ["menu NODE_MT_brdfc"]
-    layout = helpers.Layout()
-    bpy.types.NODE_MT_brdfc.draw(SimpleNamespace(layout=layout), bpy.context)
     by_look = extension.pack.models_by_look()
     models = extension.api.models()
     assert sorted(sum(by_look.values(), [])) == sorted(models)
-    assert list(by_look) == [look.lower() for look in LOOKS], "a model of each look, in this order"
+    assert list(by_look) == list(LOOKS), "a model of each look, in this order"
+    for menu, operator in (("NODE_MT_brdfc", "add_node"), ("MATERIAL_MT_brdfc", "new_material")):
+        submenus = [f"{menu}_{look}" for look in LOOKS]
+        assert menu_log(menu) == ["operator brdfc.search ", *(f"menu {name}" for name in submenus)]
+        for submenu, (look, label) in zip(submenus, LOOKS.items(), strict=True):
+            assert getattr(bpy.types, submenu).bl_label == label
+            names = by_look[look]
+            assert all(models[name]["look"] == look for name in names)
+            labels = [models[name]["label"] for name in names]
+            assert labels == sorted(labels, key=str.casefold)
+            cited = [extension.pack.model(name).citation for name in names]
+            assert menu_log(submenu) == [
+                f"operator brdfc.{operator} {label} ({paper})"
+                for label, paper in zip(labels, cited, strict=True)
+            ]
 
-    def drawn(operator):
-        log = ["operator brdfc.search "]
-        for look, names in by_look.items():
-            log.append(look.capitalize())
-            for name in names:
-                assert models[name]["look"] == look
-                cited = extension.pack.model(name).citation
-                log.append(f"operator {operator} {models[name]['label']} ({cited})")
-        return log
 
-    assert layout.log == drawn("brdfc.add_node")
+def menu_log(menu):
+    kind = getattr(bpy.types, menu)
     layout = helpers.Layout()
-    bpy.types.MATERIAL_MT_brdfc.draw(SimpleNamespace(layout=layout), bpy.context)
-    assert layout.log == drawn("brdfc.new_material")
+    told = SimpleNamespace(**vars(kind) | {"layout": layout})
+    kind.draw(told, bpy.context)
+    return layout.log
+
+
+def test_a_menu_and_a_catalogue_of_one_kind_have_one_name(extension):
+    library = import_module(f"{extension.package}.library")
+    catalogs = {entry.catalog.split("/")[0] for entry in library.entries()}
+    assert catalogs & set(LOOKS.values()) == {"Matte", "Metals"}
+    with_metal = {catalog for catalog in catalogs if "metal" in catalog.lower()}
+    assert with_metal == {"Metals"}
 
 
 def test_menus_cite_papers_as_the_page_of_models_does(extension, subtests):
@@ -1694,7 +1714,7 @@ def test_disable_leaves_nothing_behind(extension, empty):
         if isinstance(value, type)
         and issubclass(value, bpy.types.bpy_struct)
         and value.__module__ == module.__name__
-    }
+    } | set(extension.ui._SUBMENUS)
     assert defined == set(classes) and len(classes) > 10
     handlers = {
         name: list(getattr(bpy.app.handlers, name))

@@ -526,6 +526,29 @@ def test_two_scenes(lamps, shared_group, ball, empty, extension):
     assert_lamps(slots(empty), [here])
 
 
+def test_the_panel_says_that_another_window_has_other_lamps(extension, ball, empty):
+    """Pictures of its scene are right, and the panel said that the viewport is, too."""
+    add_lamp(empty, "POINT", "Here")
+    other = bpy.data.scenes.new("Other")
+    other.collection.objects.link(ball)
+    there = add_lamp(other, "POINT", "There")
+    slots(empty)
+
+    def said(scene):
+        scene.view_layers[0].update()
+        layout = helpers.Layout()
+        extension.ui.draw_lamps(layout, ball.active_material, scene)
+        return " ".join(layout.log)
+
+    sentence = f"The viewport uses the lamps of {empty.name}, the scene of the first window, so "
+    assert "Free of noise under Here" in said(empty) and sentence not in said(empty)
+    assert "Free of noise under There" in said(other)
+    assert f"{sentence}There may be noisy or missing there; pictures are right" in said(other)
+    empty.collection.objects.link(there)
+    slots(empty)
+    assert "Free of noise under There" in said(other) and sentence not in said(other)
+
+
 def test_copies_of_the_group_give_way(extension, shared_group, ball, empty, aimed, tmp_path):
     lamp = add_lamp(empty, "POINT", "Key")
     name = ball.active_material.name

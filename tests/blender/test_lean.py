@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lean materials, baked from inside Blender with the program brdfc."""
 
-import contextlib
 import os
 import sysconfig
 import time
@@ -302,45 +301,14 @@ def test_a_file_without_models_has_nothing_to_bake(extension, empty):
 # ---- beside the interface ------------------------------------------------------------------------
 
 
-class Stand:
-    """An operator as Blender has it while it is modal."""
+class Stand(helpers.Stand):
+    """An operator as Blender has it while it is modal; records what it finishes with."""
 
-    bl_label = "Bake Lean Materials"
-
-    def __init__(self, operator):
-        self.reports, self.finished, self.kind = [], None, operator
-
-    def report(self, kind, text):
-        self.reports.append(text)
-
-    def __getattr__(self, name):
-        return getattr(self.kind, name).__get__(self)
+    finished = None
 
     def finish(self, context, result):
         self.finished = result
         return {"FINISHED"}
-
-
-@pytest.fixture
-def manager():
-    """Replaces what modal operators use of Blender's windows, and records what they report."""
-    told = []
-    window_manager = SimpleNamespace(
-        event_timer_add=lambda step, window: told.append("timer") or "timer",
-        event_timer_remove=lambda timer: told.append("no timer"),
-        progress_begin=lambda low, high: told.append("begin"),
-        progress_update=lambda share: told.append(share),
-        progress_end=lambda: told.append("end"),
-        modal_handler_add=lambda operator: told.append("modal"),
-        windows=["window"],
-    )
-    context = SimpleNamespace(
-        window_manager=window_manager,
-        window=None,
-        workspace=SimpleNamespace(status_text_set=lambda text: told.append(text)),
-        temp_override=lambda window: contextlib.nullcontext(),
-    )
-    return SimpleNamespace(context=context, told=told)
 
 
 def run_through(stand, context, job, event="TIMER"):
@@ -390,7 +358,7 @@ def test_esc_while_planning_ends_the_program_and_leaves_no_file(
     assert stand.modal(manager.context, SimpleNamespace(type="A")) == {"RUNNING_MODAL"}
     assert stand.modal(manager.context, SimpleNamespace(type="MIDDLEMOUSE")) == {"PASS_THROUGH"}
     assert stand.modal(manager.context, SimpleNamespace(type="ESC")) == {"CANCELLED"}
-    assert "nothing is changed" in stand.reports[0]
+    assert "nothing is changed" in stand.reports[0][1]
     assert job._process.poll() is not None
     assert not Path(job._folder.name).exists()
     job.cancel()
@@ -423,7 +391,10 @@ def test_a_failure_beside_the_interface_is_said_and_changes_nothing(
     stand = Stand(extension.operators.BRDFC_OT_bake)
     job = extension.api.start_plan()
     assert run_through(stand, manager.context, job) == {"CANCELLED"}
-    assert stand.reports == ["brdfc: no such thing", "The program brdfc made no plan"]
+    assert [text for _, text in stand.reports] == [
+        "brdfc: no such thing",
+        "The program brdfc made no plan",
+    ]
     assert counts() == before
     assert manager.told[-3:] == ["no timer", "end", None]
 

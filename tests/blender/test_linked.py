@@ -4,6 +4,7 @@ the saved file would not keep is refused with a sentence."""
 
 import dataclasses
 import re
+from importlib import import_module
 
 import bpy
 import helpers
@@ -144,6 +145,27 @@ def test_buttons_are_greyed_and_say_why(extension, foreign):
     extension.ui.draw_material(layout, foreign("fresnel_conductor"), bpy.context.scene)
     greyed = {"brdfc.switch", "brdfc.add_albedo", "brdfc.kernel", "brdfc.substance"}
     assert layout.greyed == greyed
+
+
+def test_find_lamps_says_that_a_material_uses_those_of_its_file(extension, foreign):
+    """It said how many lamps it had found, none of which the material uses."""
+    operator = import_module(f"{extension.package}.operators.settings").BRDFC_OT_find_lamps
+    foreign("lossless")
+    helpers.add_lamp(bpy.context.scene, "POINT", location=(2, -3, 2))
+
+    def reports():
+        stand = helpers.Stand(operator)
+        assert stand.execute(bpy.context) == {"FINISHED"}
+        assert stand.reports[0][1].startswith("Lamps that leave little noise: 1 of 1")
+        return stand.reports[1:]
+
+    (((kind,), said),) = reports()
+    expected = r"'lossless' uses the lamps of .*library\.blend, from which it is linked: Make Local"
+    assert kind == "WARNING" and re.match(expected, said)
+    assert bpy.ops.brdfc.make_local() == {"FINISHED"}
+    assert reports() == []
+    foreign("phong")  # sends no rays to lamps
+    assert reports() == []
 
 
 def test_buttons_of_the_files_own_materials_are_not_greyed(extension, library):

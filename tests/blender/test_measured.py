@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Materials of measured BRDFs: files made here from formulas, and what is found in them."""
 
+import dataclasses
 import functools
 import itertools
 import json
@@ -334,15 +335,20 @@ def test_curves_look_as_the_data_do(ball, in_blender, two_colored, osl):
     np.testing.assert_allclose(got.mean((0, 1)), data.mean((0, 1)), rtol=0.02)
 
 
+def done(found):
+    """A job whose result is known."""
+    return SimpleNamespace(step=lambda: None, result=found)
+
+
 @FITS
 @pytest.mark.slow
 def test_the_operator_makes_the_closest(extension, empty, paint, found, monkeypatch):
     # Fitting all models once more takes ten seconds.
-    fits = extension.api.measured_fits
+    start = extension.api.start_measured_fits
     monkeypatch.setattr(
         extension.api,
-        "measured_fits",
-        lambda path: found if str(path) == str(paint) else fits(path),
+        "start_measured_fits",
+        lambda path: done(found) if str(path) == str(paint) else start(path),
     )
     ball = helpers.add_sphere(empty, None)
     bpy.context.view_layer.objects.active = ball
@@ -351,6 +357,12 @@ def test_the_operator_makes_the_closest(extension, empty, paint, found, monkeypa
     assert extension.model_nodes.identity(node).model == "ward"
     with pytest.raises(RuntimeError, match="There is no file"):
         bpy.ops.brdfc.new_measured_material(filepath=str(paint) + "x")
+    # As Blender passes on what was dropped.
+    files = [{"name": paint.name}, {"name": "none.csv"}]
+    assert bpy.ops.brdfc.new_measured_material(
+        filepath=str(paint), directory=str(paint.parent), files=files
+    ) == {"FINISHED"}
+    assert ball.active_material.name == "paint.001"
     handler = bpy.types.FileHandler.bl_rna_get_subclass_py("BRDFC_FH_measured")
     assert handler.bl_import_operator == "brdfc.new_measured_material"
     assert handler.bl_file_extensions == ".binary;.bsdf;.bin;.alta;.dat;.xml"
@@ -449,7 +461,8 @@ def test_the_dialog_and_the_message_say_it(extension, empty, monkeypatch, wide, 
         layout, reports = helpers.Layout(), []
         told = SimpleNamespace(
             layout=layout,
-            found=data,
+            found=(data,),
+            refusals=(),
             model=fit.model,
             report=lambda kind, text, reports=reports: reports.append((kind, text)),
         )
@@ -459,28 +472,153 @@ def test_the_dialog_and_the_message_say_it(extension, empty, monkeypatch, wide, 
         assert ({"INFO"}, str(said)) in reports
         assert reports[-1][1] != said
     # Without a dialog, too.
-    monkeypatch.setattr(extension.api, "measured_fits", lambda path: brushed)
-    reports = []
-    told = SimpleNamespace(
-        filepath="x",
-        report=lambda kind, text: reports.append(text),
-        begin_browsed=lambda: None,
+    monkeypatch.setattr(extension.api, "start_measured_fits", lambda path: done(brushed))
+    told = helpers.Stand(operators.BRDFC_OT_new_measured_material)
+    told.filepath, told.directory, told.files = "x", "", []
+    assert told.execute(bpy.context) == {"FINISHED"}
+    assert ({"INFO"}, str(said)) in told.reports
+
+
+class Dropped(helpers.Stand):
+    bl_idname, _started = "brdfc.new_measured_material", None
+
+
+@pytest.fixture
+def dropped(extension, empty, monkeypatch, wide, brushed, write_table):
+    """The operator as it is when three files are dropped together, the second of which is
+    damaged."""
+    broken = wide.path.with_name("broken.csv")
+    broken.write_text("theta_i,phi_i\n1,2\n")
+    known = {str(data.path): data for data in (wide, brushed)}
+    start = extension.api.start_measured_fits
+    monkeypatch.setattr(
+        extension.api,
+        "start_measured_fits",
+        lambda path: done(known[path]) if path in known else start(path),
     )
-    assert operators.BRDFC_OT_new_measured_material.execute(told, bpy.context) == {"FINISHED"}
-    assert str(said) in reports
+    operators = import_module(f"{extension.package}.operators.measured")
+    stand = Dropped(operators.BRDFC_OT_new_measured_material)
+    # Paths that are absolute stay as they are beside another folder.
+    paths = [str(path) for path in (brushed.path, broken, wide.path)]
+    stand.filepath, stand.directory = paths[0], str(wide.path.parent)
+    stand.files = [SimpleNamespace(name=path) for path in paths]
+    bpy.context.view_layer.objects.active = helpers.add_sphere(empty, None)
+    return stand
+
+
+def test_each_of_several_files_becomes_a_material(extension, dropped):
+    """Only the first did, and nothing was said. A file that is refused is named; others go on."""
+    assert dropped.execute(bpy.context) == {"FINISHED"}
+    assert [m.name for m in bpy.data.materials] == ["brushed", "wide"]
+    assert bpy.context.object.active_material.name == "brushed"
+    assert bpy.data.materials["wide"].use_fake_user, "it has no other user, and would not be saved"
+    warnings = [text for kind, text in dropped.reports if kind == {"WARNING"}]
+    assert warnings[0] == "broken.csv can't be read as a measured material"
+    assert warnings[1:] == ["Made brushed, wide; brushed assigned to Sphere. Failed: broken.csv"]
+    (said,) = (text for _, text in dropped.reports if "The tangent is turned" in text)
+    assert said.startswith("brushed.csv: ")
+
+
+def test_a_file_browser_passes_on_what_was_selected(extension, dropped):
+    dropped.browsed = True
+    called = []
+
+    def stand_in(how, **given):
+        called.append((how, given))
+        return {"RUNNING_MODAL"}
+
+    with pytest.MonkeyPatch.context() as patch:
+        ops = SimpleNamespace(brdfc=SimpleNamespace(new_measured_material=stand_in))
+        patch.setattr(bpy, "ops", ops)
+        assert dropped.execute(bpy.context) == {"RUNNING_MODAL"}
+    ((how, given),) = called
+    assert how == "INVOKE_DEFAULT" and given["filepath"] == dropped.filepath
+    assert given["directory"] == dropped.directory
+    assert [file["name"] for file in given["files"]] == [file.name for file in dropped.files]
+
+
+def test_several_files_that_all_fail(extension, dropped):
+    broken = dropped.files[1]
+    dropped.files = [broken, SimpleNamespace(name="none.csv")]
+    assert dropped.execute(bpy.context) == {"CANCELLED"}
+    assert not bpy.data.materials
+    assert dropped.reports[-1] == (
+        {"ERROR"},
+        "No material was made. Failed: broken.csv, none.csv",
+    )
+    dropped.reports.clear()
+    dropped.files = [broken]
+    assert dropped.execute(bpy.context) == {"CANCELLED"}
+    assert dropped.reports[-1] == (
+        {"ERROR"},
+        "broken.csv can't be read as a measured material",
+    )
+
+
+def test_the_choice_for_several_files_applies_to_all(extension, dropped, wide, brushed):
+    """Models that were fitted to all of them are offered, and the nearest of each."""
+    operator = import_module(f"{extension.package}.operators.measured").BRDFC_OT_choose_measured
+    found, refusals = dropped.start().wait()
+    try:
+        operator.show(found.values(), refusals)
+        # One model was fitted to each file, and not the same.
+        assert [item[0] for item in operator.offered] == ["nearest"]
+        both = [dataclasses.replace(brushed, fits=(*brushed.fits, *wide.fits)), wide]
+        operator.show(both, refusals)
+        assert [item[0] for item in operator.offered] == ["nearest", "cook_torrance"]
+        stand, layout = helpers.Stand(operator), helpers.Layout()
+        stand.layout, stand.model = layout, "cook_torrance"
+        stand.draw(bpy.context)
+        text = " ".join(layout.log)
+        for part in ("broken.csv can't be read", "brushed.csv: ", "wide.csv: "):
+            assert part in text
+        assert stand.execute(bpy.context) == {"FINISHED"}
+    finally:
+        operator.found, operator.refusals, operator.offered = (), (), ()
+    models = {
+        material.name: extension.model_nodes.identity(node).model
+        for material in bpy.data.materials
+        for node in extension.model_nodes.group_nodes(material)
+    }
+    assert models == {"brushed": "cook_torrance", "wide": "cook_torrance"}
+    assert stand.reports[-1][1].endswith("Failed: broken.csv")
+
+
+def test_progress_and_esc_with_several_files(extension, dropped, manager, monkeypatch):
+    """The file and its number are shown. After Esc nothing is changed, and nothing runs."""
+    start, started = extension.api.start_measured_fits, []
+
+    def start_slowly(path):
+        if path != dropped.files[1].name:
+            return start(path)
+        started.append(SimpleNamespace(step=lambda: 0.5, cancel=lambda: started.append("ended")))
+        return started[0]
+
+    monkeypatch.setattr(extension.api, "start_measured_fits", start_slowly)
+    assert dropped.invoke(manager.context, None) == {"RUNNING_MODAL"}
+    for _ in range(3):
+        result = dropped.modal(manager.context, SimpleNamespace(type="TIMER"))
+        assert result == {"RUNNING_MODAL"}
+    shown = [text for text in manager.told if isinstance(text, str) and "Esc" in text]
+    assert shown[0] == "Fitting models to brushed.csv, 1 of 3: 0%   Esc: cancel"
+    assert shown[-1] == "Fitting models to broken.csv, 2 of 3: 50%   Esc: cancel"
+    escape = SimpleNamespace(type="ESC")
+    assert dropped.modal(manager.context, escape) == {"CANCELLED"}
+    assert started[-1] == "ended" and not bpy.data.materials
+    assert "nothing is changed" in dropped.reports[-1][1]
 
 
 def test_the_dialogs_list_keeps_its_texts(extension, empty, wide):
     """Blender holds no reference to them: new ones at each redraw were shown as garbage."""
     operator = import_module(f"{extension.package}.operators.measured").BRDFC_OT_choose_measured
     try:
-        operator.show(wide)
+        operator.show([wide], {})
         items = operator.__annotations__["model"].keywords["items"]
         first, again = (items(None, bpy.context) for _ in range(2))
         assert first and all(a is b for a, b in zip(first, again, strict=True))
         assert wide.fits[0].model == first[0][0]
     finally:
-        operator.found, operator.offered = None, ()
+        operator.found, operator.offered = (), ()
 
 
 @pytest.mark.parametrize("name", ["new_measured_material", "new_measured_library"])
@@ -489,19 +627,12 @@ def test_a_browsed_file_that_fails_is_a_sentence(extension, empty, monkeypatch, 
     module = import_module(f"{extension.package}.operators.measured")
     operator = getattr(module, f"BRDFC_OT_{name}")
     monkeypatch.setenv("BRDFC_TOOL", str(tmp_path / "none"))
-    reports = []
-
-    stand = SimpleNamespace(
-        browsed=True, report=lambda *said: reports.append(said), path=operator.path
-    )
-    for method in ("start", "_paths", "begin_browsed"):
-        if found := getattr(operator, method, None):
-            setattr(stand, method, found.__get__(stand))
-    stand.filepath, stand.directory = str(tmp_path / "x.csv"), str(tmp_path)
-    assert operator.execute(stand, bpy.context) == {"CANCELLED"}
-    assert reports[-1][0] == {"ERROR"}
-    stand.job = operator.job
-    operator.cancel(stand, bpy.context)
+    stand = helpers.Stand(operator)
+    stand.browsed = True
+    stand.filepath, stand.directory, stand.files = str(tmp_path / "x.csv"), str(tmp_path), []
+    assert stand.execute(bpy.context) == {"CANCELLED"}
+    assert stand.reports[-1][0] == {"ERROR"}
+    stand.cancel(bpy.context)
 
 
 @pytest.mark.parametrize(

@@ -47,6 +47,7 @@ def classes(extension):
     drawn = [
         import_module(f"{extension.package}.{name}") for name in ("panels.ui", "panels.plot_panel")
     ]
+    yield from extension.ui._SUBMENUS
     for module in (*drawn, *helpers.modules_of_operators(extension)):
         for _, found in inspect.getmembers(module, inspect.isclass):
             if (

@@ -445,9 +445,22 @@ def test_arguments_that_python_lacks_a_number_for(extension, empty):
     assert set(bpy.data.materials) == before
 
 
-def test_what_was_painted_on_a_table_is_undone_when_the_file_is_saved(extension, empty, tmp_path):
-    """Texture Paint offers all images in a material, and takes a table as its canvas."""
-    material = extension.api.new_material("kelemen")
+@pytest.mark.parametrize(
+    ("model", "form", "osl"),
+    [
+        ("kelemen", "auto", False),
+        ("kelemen", "auto", True),
+        ("ward", "auto", True),
+        ("ward", "aimed", True),
+    ],
+)
+def test_what_was_painted_on_a_table_is_undone_when_the_file_is_saved(
+    extension, empty, tmp_path, model, form, osl
+):
+    """Texture Paint offers all images in a material, and takes a table as its canvas. Those of
+    ward's albedo stand beside its script."""
+    empty.cycles.shading_system = osl
+    material = extension.api.new_material(model, form)
     table = import_module(f"{extension.package}.content.twin").TABLE
 
     def tables():
