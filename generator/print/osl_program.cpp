@@ -65,15 +65,6 @@ class OslPrinter : public CLikePrinter {
       case Op::Select:
         // Both arms of an OSL conditional must have one type.
         return {use(n.args[0], 1) + " ? " + arm(n, 1, 1) + " : " + arm(n, 2, 1), 0};
-      case Op::Div: {
-        // OSL checks the result of a division for being finite. This function does without, and is 0 in the same cases.
-        const ExprNode& one = program_.node(n.args[0]);
-        const std::string below = use(n.args[1], 0);
-        if (one.op == Op::Const && one.type == ExprType::Real && one.value[0] == 1 && below.starts_with("sqrt(") &&
-            program_.node(n.args[1]).op == Op::Sqrt)
-          return {"inverse" + below, 6};
-        return CLikePrinter::text(id);
-      }
       case Op::Lookup: {
         std::string sizes, positions;
         for (std::size_t i = 0; i < n.args.size(); ++i) {

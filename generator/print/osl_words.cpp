@@ -20,7 +20,7 @@ constexpr const char* kOslWords = R"(
   Ci I N Ng Oi P Ps dPdtime dPdu dPdv dtime time u v
 
   abs atan backfacing burley_diffuse_bsdf cbrt clamp cos diffuse_ramp dot emission exp generalized_schlick_bsdf getattribute glossy_toon
-  inversesqrt isfinite log max microfacet min normalize oren_nayar_diffuse_bsdf phong_ramp pow raytype reflect reflection refraction sin sqrt
+  isfinite log max microfacet min normalize oren_nayar_diffuse_bsdf phong_ramp pow raytype reflect reflection refraction sin sqrt
 
   area ceil cross distance floor hypot length mix mod noise rotate round sign smoothstep step transform
 
