@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <map>
 #include <string_view>
 
 #include "fit/roles.h"
@@ -28,6 +27,7 @@ using print::assign;
 using print::Assign;
 using print::Block;
 using print::call;
+using print::choice;
 using print::Comment;
 using print::Continue;
 using print::declare;
@@ -90,25 +90,56 @@ Value vector_of(const std::string& name) { return call("vector", {name + "_x", n
 /// A slot of the current lamp.
 Value of_lamp(const char* array) { return element(array, "lamp"); }
 
-/// The numbers of a lamp and its lobe that later iterations read, kept in the array kept_<name>. Wherever they are read
-/// or assigned they have variables of their own: an array's element costs OSL's compiler a check of the index and code
-/// of its own at each mention, which is half of the time that a shader takes to compile.
+/// The numbers of a lamp and its lobe that later iterations read, kept in two arrays of matrices. Wherever they are
+/// read or assigned they have variables of their own. OSL's compiler checks the index at each mention of an array's
+/// element and gives the check code of its own. Formulas that read elements doubled the time that a shader takes to
+/// compile, and an array for each number cost another tenth.
 struct Kept {
   const char *type, *of, *name;
 };
 constexpr Kept kKept[] = {
-    {"vector", "lamp", "centre"},     {"vector", "lamp", "across"},  {"vector", "lamp", "along"},
-    {"vector", "lobe", "towards"},    {"vector", "lobe", "half"},    {"float", "lamp", "disk"},
-    {"float", "lamp", "solid_angle"}, {"float", "lobe", "exponent"}, {"float", "lobe", "radius"},
-    {"float", "lobe", "end"},         {"float", "lobe", "extent"},   {"color", "lobe", "value"},
+    {"vector", "lamp", "centre"}, {"vector", "lamp", "across"},     {"vector", "lamp", "along"},
+    {"float", "lamp", "disk"},    {"float", "lamp", "solid_angle"}, {"vector", "lobe", "towards"},
+    {"vector", "lobe", "half"},   {"color", "lobe", "value"},       {"float", "lobe", "exponent"},
+    {"float", "lobe", "radius"},  {"float", "lobe", "end"},         {"float", "lobe", "extent"},
+    {"float", "lobe", "rise"},
 };
-std::string kept_array(std::string_view name) { return fmt::format("kept_{}", name); }
-/// Declares variables <of>_<name> with the numbers of the lobe at an index.
+std::string kept_array(std::string_view of) { return fmt::format("kept_{}", of); }
+std::size_t size_of(const Kept& kept) { return kept.type == std::string_view("float") ? 1 : 3; }
+/// A variable's value, read from a matrix.
+Value in_matrix(const std::string& matrix, const Kept& kept) {
+  std::size_t at = 0;
+  for (const Kept* k = kKept; k != &kept; ++k)
+    if (k->of == std::string_view(kept.of)) at += size_of(*k);
+  std::vector<Value> numbers;
+  for (std::size_t i = at; i < at + size_of(kept); ++i)
+    numbers.push_back(element(element(matrix, int(i / 4)), int(i % 4)));
+  return numbers.size() == 1 ? numbers[0] : call(kept.type, numbers);
+}
+/// Keeps the variables of the current lamp or of its lobe.
+Statement keep(std::string_view of) {
+  std::vector<Value> numbers;
+  for (const Kept& kept : kKept) {
+    if (of != kept.of) continue;
+    const std::string name = fmt::format("{}_{}", kept.of, kept.name);
+    if (size_of(kept) == 1) numbers.push_back(name);
+    for (int i = 0; size_of(kept) == 3 && i < 3; ++i) numbers.push_back(element(name, i));
+  }
+  numbers.resize(16, Value(0.0));
+  return assign(element(kept_array(of), "lobes"), call("matrix", numbers));
+}
+/// Declares variables <of>_<name> with the numbers of a lobe and its lamp, which are kept at this index.
 Statements load(const std::string& of, const char* index, const std::vector<std::string_view>& names) {
   Statements out;
+  std::set<std::string> read;
   for (const std::string_view name : names) {
     const Kept& kept = *std::ranges::find(kKept, name, &Kept::name);
-    out.push_back(declare(kept.type, fmt::format("{}_{}", of, name), element(kept_array(name), index)));
+    const std::string matrix = fmt::format("{}_{}", of, kept.of);
+    if (read.insert(matrix).second) out.push_back(declare("matrix", matrix, element(kept_array(kept.of), index)));
+    Value value = in_matrix(matrix, kept);
+    // If no lamp has corners, OSL leaves out what they need.
+    if (name == "disk") value = choice("any_corner", value, 1.0);
+    out.push_back(declare(kept.type, fmt::format("{}_{}", of, name), value));
   }
   return out;
 }
@@ -133,8 +164,8 @@ class AimedLamps {
     if (lamps_ == 0) return operations_ + steps_.alone.operations();
     int all = operations_ + steps_.rest.operations();
     // Programs for light cones and horizons are not counted, because few lamps need them.
-    for (const Recording* r : {&steps_.above, &steps_.room, &steps_.aim, &steps_.low, &steps_.less, &steps_.send,
-                               &steps_.toss, &steps_.under, &steps_.meet})
+    for (const Recording* r : {&steps_.above, &steps_.room, &steps_.aim, &steps_.low, &steps_.emphasis, &steps_.less,
+                               &steps_.send, &steps_.toss, &steps_.under, &steps_.meet})
       all += r->operations();
     return all;
   }
@@ -156,8 +187,9 @@ class AimedLamps {
     out.push_back(Comment{"The lamps, and at last the direction that was drawn."});
     Statements turn = {
         declare_all("vector", {"lamp_centre", "lamp_across", "lamp_along", "lobe_towards", "lobe_half"}),
-        declare_all("float", {"wi_x", "wi_y", "wi_z", "lamp_disk", "lamp_solid_angle", "lamp_emphasis", "lobe_height",
-                              "lobe_exponent", "lobe_radius", "lobe_end", "lobe_extent"}),
+        declare_all("float", {"wi_x", "wi_y", "wi_z", "lamp_disk", "lamp_solid_angle", "lamp_density", "lamp_rise",
+                              "lamp_emphasis", "lobe_height", "lobe_exponent", "lobe_radius", "lobe_end", "lobe_extent",
+                              "lobe_rise"}),
         If{is_lamp(), aim(), draw()},
         declare("color", "excess"),
         declare("float", "drawn_density"),
@@ -198,28 +230,22 @@ class AimedLamps {
                    {{"any_flat", {any(1, test("brdfc_is_flat"))}},
                     {"any_spot", {any(1, test("brdfc_is_spot"))}},
                     {"any_beam", {any(1, test("brdfc_has_beam"))}},
+                    // The part of a lamp that its light cone reaches may be a rectangle.
+                    {"any_corner", {print::any_of({"any_beam", any(1, test("brdfc_is_rectangle"))})}},
                     {"several", {any(2, [](const Value& shape) { return operation(element(shape, 0), ">", 0.0); })}}}};
   }
 
-  /// Declares the variables for lamps and lobes, and counts the sockets up to the last one in use.
+  /// Declares the variables for lamps and lobes, and finds the last socket in use.
   Statements state() const {
-    std::map<std::string, Declare> arrays;
-    for (const Kept& kept : kKept) {
-      Declare& all = arrays.try_emplace(kept.type, Declare{kept.type, {}}).first->second;
-      all.variables.push_back({kept_array(kept.name), {}, lamps_});
-    }
-    Declare& colours = arrays.at("color");
-    for (const char* name : {"covered", "covered_before"}) colours.variables.push_back({name, {0.0}});
+    Value used(0);
+    for (int i = 1; i <= lamps_; ++i)
+      used = choice(operation(element(fmt::format("LampShape{}", i), 0), ">", 0.0), i, used);
     return {
-        arrays.at("vector"),
-        arrays.at("float"),
-        colours,
+        Declare{"matrix", {{kept_array("lamp"), {}, lamps_}, {kept_array("lobe"), {}, lamps_}}},
+        Declare{"color", {{"covered", {0.0}}, {"covered_before", {0.0}}}},
         Declare{"float", {{"ray_x"}, {"ray_y"}, {"ray_z"}, {"lamp_met", {0.0}}, {"density_under", {0.0}}}},
         declare("closure color", "aimed", 0),
-        Declare{"int", {{"lamps", {0}}, {"lobes", {0}}}},
-        Loop{"lamp",
-             lamps_,
-             {If{operation(element(of_lamp("lamp_shape"), 0), ">", 0.0), {assign("lamps", Value("lamp") + 1)}}}},
+        Declare{"int", {{"lamps", {used}}, {"lobes", {0}}}},
     };
   }
 
@@ -228,8 +254,9 @@ class AimedLamps {
     Statements out = {
         declare_all("vector", {"centre_here", "across_here", "along_here", "beam_here"}),
         Declare{"float", {{"disk_here"}, {"beam_edge"}, {"beam_blend"}, {"lobe_room", {1.0}}}},
+        declare("vector", "shape_here", of_lamp("lamp_shape")),
         If{operation(call("brdfc_lamp", {of_lamp("lamp_place"), of_lamp("lamp_turn"), of_lamp("lamp_scale"),
-                                         of_lamp("lamp_shape"), "any_flat", "any_spot", "centre_here", "across_here",
+                                         "shape_here", "any_flat", "any_spot", "centre_here", "across_here",
                                          "along_here", "disk_here", "beam_here", "beam_edge", "beam_blend"}),
                      "==", 0),
            {Continue{}}},
@@ -264,7 +291,7 @@ class AimedLamps {
     if (!through_)
       append(out,
              {declare("float", "lamp_above"), run(steps_.above), If{operation("lamp_above", "<=", 0.0), {Continue{}}}});
-    const Statement none_left = If{operation("lamp_emphasis", "==", 0.0), {Continue{}}};
+    const Statement none_left = If{operation("lamp_rise", "<=", 0.0), {Continue{}}};
     append(out,
            {
                Comment{"Numbers of its own: what a lobe gives at another's lamp must not go with where that is met."},
@@ -279,12 +306,15 @@ class AimedLamps {
                declare("float", "lamp_low"),
                Block{{run(steps_.low)}},
                If{print::all_of({operation("lamp_low", "<", 0.0),
-                                 operation(call("brdfc_cuts_off", {of_lamp("lamp_shape"), "centre_here", "across_here",
+                                 operation(call("brdfc_cuts_off", {"shape_here", "centre_here", "across_here",
                                                                    "along_here", "disk_here"}),
                                            "!=", 0)}),
                   {run(steps_.cut), none_left}},
+               Block{{run(steps_.emphasis)}},
+               If{operation("lamp_emphasis", "==", 0.0), {Continue{}}},
                Comment{"Drawn directions do not meet it, or are not to: see brdfc_lamp()."},
-               If{operation(element(of_lamp("lamp_shape"), 1), "<", 0.0), {assign("lamp_solid_angle", 1e-20)}},
+               If{operation(element("shape_here", 1), "<", 0.0), {assign("lamp_solid_angle", 1e-20)}},
+               keep("lamp"),
            });
     return out;
   }
@@ -303,7 +333,7 @@ class AimedLamps {
       out.push_back(assign(std::string("ray") + axis, std::string("drawn") + axis));
     // A lamp and its seam always lie within the lamp's lobe.
     out.push_back(under_earlier_lobes(
-        "drawn", {"half", "exponent", "extent", "value", "centre", "across", "along", "disk", "solid_angle"},
+        "drawn", {"half", "exponent", "extent", "rise", "value", "centre", "across", "along", "disk", "solid_angle"},
         steps_.meet));
     for (const char* axis : {"_x", "_y", "_z"})
       out.push_back(assign(std::string("wi") + axis, std::string("drawn") + axis));
@@ -312,12 +342,10 @@ class AimedLamps {
 
   /// Assigns the value of the lobe that was aimed, keeps its numbers, and adds its closure.
   Statements send() const {
-    Statements out = {If{"several", {under_earlier_lobes("wi", {"half", "exponent", "value"}, steps_.less)}},
+    Statements out = {If{"several", {under_earlier_lobes("wi", {"half", "exponent", "rise", "value"}, steps_.less)}},
                       declare("float", "lobe_weight"), declare_all("color", {"lobe_value", "lobe_colour"}),
                       run(steps_.send)};
-    for (const Kept& kept : kKept)
-      out.push_back(assign(element(kept_array(kept.name), "lobes"), fmt::format("{}_{}", kept.of, kept.name)));
-    append(out, {print::Increment{"lobes"}, closure()});
+    append(out, {keep("lobe"), print::Increment{"lobes"}, closure()});
     return out;
   }
 
@@ -341,17 +369,12 @@ class AimedLamps {
   /// The closure of the lobe. It is added at the left of the sum, which Cycles traverses without a stack. The weight is
   /// a colour: OSL stores it with the closure, and a number apart from it (peephole2() in its runtimeoptimize.cpp).
   static Statement closure() {
-    constexpr int kSize = int(kRampSize);
-    Variable level{"lobe_level", {}, kSize};
-    for (const double c : aimed_ramp()) level.values.push_back(c);
+    Variable colours{"lobe_colours", {}, int(kRampSize)};
+    for (const double c : aimed_ramp()) colours.values.push_back(c == 0 ? Value(0.0) : Value(c) * "lobe_colour");
     return If{
         operation("lobe_weight", ">", 0.0),
         {
-            Declare{"float", {level}},
-            Declare{"color", {{"lobe_colours", {}, kSize}}},
-            Loop{"entry",
-                 kSize,
-                 {assign(element("lobe_colours", "entry"), element("lobe_level", "entry") * "lobe_colour")}},
+            Declare{"color", {colours}},
             declare("vector", "half_way", in_scene_of("lobe_half")),
             declare("color", "lobe_followed", "lobe_weight"),
             assign("aimed", Value("lobe_followed") * call("phong_ramp", {"half_way", "lobe_exponent", "lobe_colours"}) +
@@ -410,7 +433,7 @@ class Aimed final : public OslForm {
                                     const Setting& setting) const override {
     const AimedRecording r = record_aimed(model, values, setting.base, setting.views);
     const AimedSteps& s = aimed_steps();
-    return {r.base, r.draw, r.value, s.beam, s.room, s.aim, s.cut, s.less, s.send, s.rest};
+    return {r.base, r.draw, r.value, s.beam, s.room, s.aim, s.cut, s.emphasis, s.less, s.send, s.rest};
   }
 
  protected:

@@ -47,14 +47,15 @@ template <class T> struct AimedLobe {
   T sinRadius;  ///< of the lamp's bounding sphere
   T cosEnd;     ///< the lobe is 0 where the cosine to `towards` is smaller
   T extent;     ///< solid angle in which the lobe is not 0
+  T rise;       ///< cosine between `half` and `towards`
 };
 
 /// What the shader computes for one lamp at a shading point.
 template <class T> struct AimedLamp {
   AimedLobe<T> lobe;
-  Vec3<T> wi;  ///< unit vector to the chosen point of the lamp
-  T emphasis;  ///< solid angle that the point stands for, over the mean of all points and over the lobe's height there,
-               ///< which is 1 to a few percent; 0 if the lamp is left to the rest
+  Vec3<T> wi;     ///< unit vector to the chosen point of the lamp
+  T density;      ///< solid angle per area there, up to a factor
+  T mean_rise;    ///< the mean of density times cosine to the lobe's normal; 0 if the lamp is left to the rest
   T solid_angle;  ///< of the whole lamp
   T height;       ///< factor from aimed_ramp() to the closure's colours for f cos = 1
 };
@@ -70,22 +71,23 @@ template <class T> T aimed_profile(const T& lobe) {
   return lobe * select(position < T(kLevel), maximum(flank, T(0)), level);
 }
 
-/// aimed_profile() for a direction with this cosine to the lobe's centre.
+/// aimed_profile() for a direction with this cosine to the lobe's centre. The cosine is above 0, so no pow() is needed,
+/// which takes OSL's compiler longer.
 template <class T> T profile_of(const AimedLobe<T>& lobe, const T& cosAlpha) {
-  return aimed_profile(pow(maximum(cosAlpha, lobe.cosEnd), lobe.exponent));
+  return aimed_profile(exp(lobe.exponent * log(maximum(cosAlpha, lobe.cosEnd))));
 }
 
 /// f cos of an aimed closure with value 1.
 template <class T> T evaluate(const AimedLobe<T>& lobe, const Vec3<T>& wi) {
   const T cosAlpha = dot(lobe.towards, wi), rise = dot(lobe.half, wi);
   const T profile = profile_of(lobe, cosAlpha);
-  return select(cosAlpha > lobe.cosEnd && rise > T(0), profile * (rise / dot(lobe.half, lobe.towards)), T(0));
+  return select(cosAlpha > lobe.cosEnd && rise > T(0), profile * (rise / lobe.rise), T(0));
 }
 
 /// The radius, as a sine, that a lobe towards `centre` may have without covering the lamp of an earlier lobe. If it
 /// covered that lamp, the drawn directions would have to subtract the overlap, which is as bright as the lamp.
 template <class T> T room_beside(const Vec3<T>& centre, const AimedLobe<T>& earlier) {
-  return length(normalize(centre) - earlier.towards) - earlier.sinRadius;
+  return length(divided(centre, length(centre)) - earlier.towards) - earlier.sinRadius;
 }
 
 /// The lobe for a lamp whose bounding sphere has this sine of its angular radius. wo: unit vector to the viewer.
@@ -100,12 +102,14 @@ template <class T> AimedLobe<T> aim(const Vec3<T>& towards, const T& sinRadius, 
   const T sinWidth = minimum(maximum(wide, sinRadius + T(kTight)), T(kMost));
   AimedLobe<T> lobe;
   lobe.towards = towards;
-  lobe.half = normalize(towards + wo);
+  lobe.half = divided(towards + wo, length(towards + wo));
   // cos^e = kLevel / 7 at the width
-  lobe.exponent = T(2 * level) / log1p(-sqr(sinWidth));
+  const T log_cos2 = log1p(-sqr(sinWidth)), drop = expm1(T(end / (2 * level)) * log_cos2);
+  lobe.exponent = T(2 * level) / log_cos2;
   lobe.sinRadius = sinRadius;
-  lobe.cosEnd = exp(T(end) / lobe.exponent);
-  lobe.extent = T(-2) * pi<T>() * expm1(T(end) / lobe.exponent);
+  lobe.cosEnd = T(1) + drop;
+  lobe.extent = T(-2) * pi<T>() * drop;
+  lobe.rise = dot(lobe.half, towards);
   return lobe;
 }
 
@@ -114,8 +118,8 @@ template <class T> Vec3<T> sample_under(const AimedLobe<T>& lobe, const T& u, co
   // Computed from 1 - cos, which keeps all digits for narrow lobes.
   const T drop = u * lobe.extent / (T(2) * pi<T>()), sine = sqrt(drop * (T(2) - drop)), turn = T(2) * pi<T>() * v;
   const auto upright = abs(lobe.towards.z) > T(0.9);
-  const Vec3<T> t =
-      normalize(cross(lobe.towards, Vec3<T>{select(upright, T(1), T(0)), T(0), select(upright, T(0), T(1))}));
+  const Vec3<T> side = cross(lobe.towards, Vec3<T>{select(upright, T(1), T(0)), T(0), select(upright, T(0), T(1))});
+  const Vec3<T> t = divided(side, length(side));
   const Vec3<T> b = cross(lobe.towards, t);
   return lobe.towards * (T(1) - drop) + t * (sine * cos(turn)) + b * (sine * sin(turn));
 }
@@ -142,39 +146,48 @@ template <class T> Against<T> against(const LampPatch<T>& patch, const Vec3<T>& 
   const T facing = dot(normal, drawn), slant = select(abs(facing) > tiny<T>(), facing, tiny<T>());
   const T reach = dot(normal, patch.centre) / slant;
   const Vec3<T> offset = drawn * reach - patch.centre;
-  const T a2 = dot(patch.across, patch.across), b2 = dot(patch.along, patch.along);
-  const T x = dot(offset, patch.across) / a2, y = dot(offset, patch.along) / b2;
+  const T a = length(patch.across), b = length(patch.along);
+  const T x = dot(offset, patch.across) / sqr(a), y = dot(offset, patch.along) / sqr(b);
   const T radius = select(disk, sqrt(x * x + y * y), maximum(abs(x), abs(y)));
   const auto on = reach > T(0) && radius < T(1);
-  // Width of the seam in the plane of the lamp, and where it ends in units of the half axes.
-  const T width = T(kSeam) * reach * sqrt(a2 * b2) / maximum(abs(facing), tiny<T>()) * select(on, T(-1), T(1));
-  const T end_x = maximum(T(1) + width / sqrt(a2), T(0)), end_y = maximum(T(1) + width / sqrt(b2), T(0));
-  const T round = select(on, minimum(end_x, end_y), maximum(end_x, end_y)) / maximum(radius, tiny<T>());
+  // Where the seam ends in units of the half axes. In the plane of the lamp its width is this times a b.
+  const T width = T(kSeam) * reach / maximum(abs(facing), tiny<T>()) * select(on, T(-1), T(1));
+  const T end_x = maximum(T(1) + width * b, T(0)), end_y = maximum(T(1) + width * a, T(0));
+  const T end = select(on, minimum(end_x, end_y), maximum(end_x, end_y)), round = end / maximum(radius, tiny<T>());
   const auto off_x = abs(x) > select(on, end_x, T(1)), off_y = (on && abs(y) > end_y) || (!on && !off_x);
-  const auto beyond =
-      select(disk, round, minimum(end_x / maximum(abs(x), tiny<T>()), end_y / maximum(abs(y), tiny<T>()))) < T(1);
+  const auto beyond_x = maximum(abs(x), tiny<T>()) > end_x, beyond_y = maximum(abs(y), tiny<T>()) > end_y;
+  const auto beyond = (disk && maximum(radius, tiny<T>()) > end) || (!disk && (beyond_x || beyond_y));
   const auto near = (on && beyond) || (!on && reach > T(0) && !beyond);
-  const Vec3<T> moved = normalize(patch.at(select(disk, x * round, select(off_x, select(x > T(0), end_x, -end_x), x)),
-                                           select(disk, y * round, select(off_y, select(y > T(0), end_y, -end_y), y))));
+  const Vec3<T> to = patch.at(select(disk, x * round, select(off_x, select(x > T(0), end_x, -end_x), x)),
+                              select(disk, y * round, select(off_y, select(y > T(0), end_y, -end_y), y)));
+  const Vec3<T> moved = divided(to, length(to));
   const auto moves = near && moved.z * drawn.z > T(0);
   return {select(on, T(1), T(0)), select(moves, T(1), T(0)), select(moves, moved, drawn)};
 }
 
-/// Lower bound of the lobe's profile by which AimedLamp::emphasis is divided. Where a part of a lamp shines, f is
+/// Lower bound of the lobe's profile by which emphasis_of() divides. Where a part of a lamp shines, f is
 /// averaged over a shape that reaches a little over the edge of that part, and a lobe that is narrow for other lamps
 /// falls to 0 there.
 inline constexpr double kLeastProfile = 0.25;
 
-/// AimedLamp::emphasis of the chosen point. `solid_angle`: what the point stands for. `mean_rise`: the mean of solid
-/// angle times cosine to the lobe's normal.
+/// Solid angle that the chosen point stands for, over the mean of all points and over the lobe's height there, which is
+/// 1 to a few percent; 0 if the lamp is left to the rest.
 ///
 /// Divides by the lobe: by its profile at the point, which is even about the lamp's centre, but by the mean cosine over
 /// the whole lamp. If the cosine at the point were used as well, f and the cosine of the point where light sampling
 /// hits the lamp would be correlated wrongly, and the average would not be f.
-template <class T> T emphasis_of(const AimedLamp<T>& lamp, const T& solid_angle, const T& mean_rise) {
-  const T rise = dot(lamp.lobe.half, lamp.lobe.towards);
+template <class T> T emphasis_of(const AimedLamp<T>& lamp) {
   const T profile = maximum(profile_of(lamp.lobe, dot(lamp.lobe.towards, lamp.wi)), T(kLeastProfile));
-  return solid_angle * rise / maximum(profile * mean_rise, tiny<T>());
+  return select(lamp.mean_rise > T(0), lamp.density * lamp.lobe.rise / maximum(profile * lamp.mean_rise, tiny<T>()),
+                T(0));
+}
+
+/// Solid angle per area at a point of a lamp, up to the length of `normal`, and the cosine between the point and an
+/// axis.
+template <class T> struct Seen { T density, cosine; };
+template <class T> Seen<T> seen(const Vec3<T>& point, const Vec3<T>& normal, const Vec3<T>& axis) {
+  const T nearness = T(1) / length(point);
+  return {abs(dot(normal, point)) * (nearness * nearness * nearness), dot(axis, point) * nearness};
 }
 
 /// Aims a closure at a lamp. `shining`: the mean of its lit_part(), or the lamp itself. `room`: see room_beside(). v1,
@@ -192,38 +205,34 @@ template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const LampPatc
   const T distance2 = dot(patch.centre, patch.centre);
   const T radius2 = select(disk, maximum(a2, b2), a2 + b2);
   AimedLamp<T> lamp;
-  const Vec3<T> towards = patch.centre / sqrt(distance2);
+  const Vec3<T> towards = divided(patch.centre, sqrt(distance2));
   lamp.lobe = aim(towards, sqrt(minimum(radius2 / distance2, T(1))), room, wo);
-  const T rise = dot(lamp.lobe.half, towards);
+  const T rise = lamp.lobe.rise;
   lamp.height = T(2) * pi<T>() / (rise * (lamp.lobe.exponent + T(2)));
 
   const T radius = sqrt(v1), angle = T(2) * pi<T>() * v2;
   const auto round = shining.disk > T(0.5);
   const Vec3<T> point = shining.at(select(round, radius * cos(angle), T(2) * v1 - T(1)),
                                    select(round, radius * sin(angle), T(2) * v2 - T(1)));
-  lamp.wi = normalize(point);
-  // Solid angle per area, up to the length of `normal`, which is the lamp's area divided by 4 or pi.
+  lamp.wi = divided(point, length(point));
+  // Its length is the lamp's area divided by 4 or pi.
   const Vec3<T> normal = cross(patch.across, patch.along);
-  const auto density = [&](const Vec3<T>& p) {
-    const T d2 = dot(p, p);
-    return abs(dot(normal, p)) / (d2 * sqrt(d2));
-  };
   // Mean over the shining part by a four-point rule that is exact to degree 3 (A. Stroud: Approximate Calculation of
   // Multiple Integrals, 1971, C2: 3-1 and S2: 3-1). The same rule gives the mean cosine to the lobe's normal.
   // Each of the points is the one before it, turned by 90 degrees. State of the loop: the point, and the two sums.
   const T node = select(round, T(std::sqrt(0.5)), T(std::sqrt(1.0 / 3))), other = select(round, T(0), node);
   const std::array<T, 4> means = iterate(4, std::array<T, 4>{node, other, T(0), T(0)}, [&](const std::array<T, 4>& s) {
     const Vec3<T> p = shining.at(s[0], s[1]);
-    const T d = density(p) / T(4);
-    return std::array<T, 4>{-s[1], s[0], s[2] + d, s[3] + d * (dot(lamp.lobe.half, p) / sqrt(dot(p, p)))};
+    const Seen<T> at = seen(p, normal, lamp.lobe.half);
+    return std::array<T, 4>{-s[1], s[0], s[2] + at.density, s[3] + at.density * at.cosine};
   });
-  const T mean = means[2], mean_rise = means[3];
-  lamp.solid_angle = select(disk, pi<T>(), T(4)) * mean;
+  lamp.solid_angle = select(disk, pi<T>() / T(4), T(1)) * means[2];
   const T sinRadius = lamp.lobe.sinRadius;
   const T least_rise = rise * sqrt(T(1) - sqr(sinRadius)) - sqrt(maximum(T(1) - sqr(rise), T(0))) * sinRadius;
   const auto usable = radius2 < T(kNearest * kNearest) * distance2 && dot(shining.across, shining.across) > T(0) &&
                       least_rise > maximum(T(kLeastRise), T(kLeastShare) * rise);
-  lamp.emphasis = select(usable, emphasis_of(lamp, density(point), mean_rise), T(0));
+  lamp.density = seen(point, normal, lamp.lobe.half).density;
+  lamp.mean_rise = select(usable, means[3] / T(4), T(0));
   return lamp;
 }
 
@@ -235,11 +244,6 @@ AimedLamp<T> cut_off(AimedLamp<T> lamp, const LampPatch<T>& shining, const Vec3<
   constexpr int kSteps = 6;
   const PartAbove<T> part(shining, normal);
   const Vec3<T> axis = cross(shining.across, shining.along);
-  // Solid angle that a point stands for, up to the length of the axis.
-  const auto density = [&](const typename PartAbove<T>::Point& p) {
-    const T d2 = dot(p.at, p.at);
-    return p.area * abs(dot(axis, p.at)) / (d2 * sqrt(d2));
-  };
   // Integrates solid angle and cosine over the part: midpoint rule along u, two-point Gauss rule along v. The last turn
   // of the loop is the chosen point, so that the text has one copy of part.at(): copies take long to compile.
   // State of the loop: u, v, the sum, and a point and its density.
@@ -249,20 +253,23 @@ AimedLamp<T> cut_off(AimedLamp<T> lamp, const LampPatch<T>& shining, const Vec3<
               [&](const std::array<T, 7>& s) {
                 const auto chosen = s[0] > T(1);
                 const auto p = part.at(select(chosen, v1, s[0]), select(chosen, v2, s[1]));
-                const T d = density(p), rise = dot(lamp.lobe.half, p.at) / sqrt(dot(p.at, p.at));
+                const Seen<T> there = seen(p.at, axis, lamp.lobe.half);
+                const T d = p.area * there.density;
                 return std::array<T, 7>{select(s[1] > T(0.5), s[0] + T(1.0 / kSteps), s[0]),
                                         T(1) - s[1],
-                                        select(chosen, s[2], s[2] + d * rise),
+                                        select(chosen, s[2], s[2] + d * there.cosine),
                                         p.at.x,
                                         p.at.y,
                                         p.at.z,
                                         d};
               });
   const T mean_rise = turns[2] / T(2 * kSteps);
-  lamp.wi = normalize(Vec3<T>{turns[3], turns[4], turns[5]});
+  const Vec3<T> point{turns[3], turns[4], turns[5]};
+  lamp.wi = divided(point, length(point));
+  lamp.density = turns[6];
   // If the lobe's normal lies below the plane, the lobe is black everywhere above it.
-  const auto shows = lamp.emphasis > T(0) && mean_rise > T(0) && dot(lamp.lobe.half, normal) > T(0);
-  lamp.emphasis = select(shows, emphasis_of(lamp, turns[6], mean_rise), T(0));
+  const auto shows = lamp.mean_rise > T(0) && dot(lamp.lobe.half, normal) > T(0);
+  lamp.mean_rise = select(shows, mean_rise, T(0));
   return lamp;
 }
 
@@ -286,12 +293,12 @@ template <class T> struct Sent {
 };
 
 /// `value`: f cos - base towards AimedLamp::wi, minus what the lobes of earlier lamps give there. `density`: the pdf
-/// with which draw() draws that direction.
-template <class T> Sent<T> send(const AimedLamp<T>& lamp, const Rgb<T>& value, const T& density) {
+/// with which draw() draws that direction. `emphasis`: emphasis_of() the lamp.
+template <class T> Sent<T> send(const AimedLamp<T>& lamp, const T& emphasis, const Rgb<T>& value, const T& density) {
   // Cycles drops closures with a small weight.
   constexpr double kLeastWeight = 1e-3;
   Sent<T> out;
-  out.value = value * (lamp.emphasis * (T(1) - share_of_drawn(lamp.solid_angle, density)));
+  out.value = value * (emphasis * (T(1) - share_of_drawn(lamp.solid_angle, density)));
   const T size = largest(out.value);
   out.weight = select(size > T(0), minimum(maximum(size * lamp.lobe.extent, T(kLeastWeight)), T(1)), T(0));
   out.colour = out.value * (lamp.height / maximum(out.weight, T(kLeastWeight)));
@@ -329,7 +336,7 @@ template <class T> Met<T> meet(Met<T> met, const LampPatch<T>& patch, const Aime
   met.ray = select(here || (lamp.in_seam > T(0) && met.solid_angle <= T(0)), lamp.moved, met.ray);
   met.solid_angle = select(here, solid_angle, met.solid_angle);
   met.before = select(here, met.covered, met.before);
-  // On its own lamp the lobe's small deviation from 1 is part of AimedLamp::emphasis and is not subtracted here. In the
+  // On its own lamp the lobe's small deviation from 1 is part of emphasis_of() and is not subtracted here. In the
   // rest it would cause rare bright dots, as in a seam. Below the surface nothing is subtracted.
   met.covered += value * select(here || drawn.z <= T(0), T(0), evaluate(lobe, drawn));
   met.density = met.density + pdf_under(lobe, drawn);

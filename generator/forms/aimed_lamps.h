@@ -11,6 +11,9 @@
 
 namespace brdfc::forms {
 
+/// v / s with one division: OSL checks the result of each, and the checks take long to compile.
+template <class T> Vec3<T> divided(const Vec3<T>& v, const T& s) { return v * (T(1) / s); }
+
 /// A lamp as a flat patch, in any unit of length: a rectangle, or a disk or ellipse, with these half axes. For a sun
 /// the centre is at distance 1.
 template <class T> struct LampPatch {
@@ -51,8 +54,8 @@ template <class T> class PartAbove {
     const auto swapped = abs(a) > abs(b);
     const Vec3<T> across = select(swapped, patch.along, patch.across),
                   along = select(swapped, patch.across, patch.along);
-    p_ = select(disk_, (patch.across * b - patch.along * a) / unit, across * sign_of(dot(normal, across)));
-    q_ = select(disk_, (patch.across * a + patch.along * b) / unit, along * sign_of(dot(normal, along)));
+    p_ = select(disk_, divided(patch.across * b - patch.along * a, unit), across * sign_of(dot(normal, across)));
+    q_ = select(disk_, divided(patch.across * a + patch.along * b, unit), along * sign_of(dot(normal, along)));
     height_ = dot(normal, patch.centre);
     flat_ = select(disk_, T(0), minimum(abs(a), abs(b)));
     steep_ = maximum(select(disk_, slope, maximum(abs(a), abs(b))), tiny<T>());
@@ -64,8 +67,9 @@ template <class T> class PartAbove {
   Point at(const T& u, const T& v) const {
     // For a disk, p is the sine of an angle, which makes the integrand smooth at the round ends.
     const T angle = pi<T>() * (u - T(0.5));
-    const T p = select(disk_, half_chord_ * sin(angle), first_ + u * (T(1) - first_));
-    const T step = select(disk_, half_chord_ * pi<T>() * cos(angle), T(1) - first_);
+    const T sine = sin(angle), cosine = sqrt(maximum(T(1) - sqr(sine), T(0)));
+    const T p = select(disk_, half_chord_ * sine, first_ + u * (T(1) - first_));
+    const T step = select(disk_, half_chord_ * pi<T>() * cosine, T(1) - first_);
     const T end = select(disk_, sqrt(maximum(T(1) - sqr(p), T(0))), T(1));
     const T start = minimum(maximum(-(height_ + flat_ * p) / steep_, -end), end);
     return {patch_.centre + p_ * p + q_ * (start + v * (end - start)), step * (end - start)};
@@ -107,7 +111,7 @@ template <class T> struct LitPart {
 template <class T> LitPart<T> lit_part(const LampPatch<T>& patch, const LampBeam<T>& beam) {
   constexpr int kSteps = 5;
   const T a = length(patch.across), b = length(patch.along);
-  const Vec3<T> n = cross(patch.across, patch.along) / (a * b);
+  const Vec3<T> n = divided(cross(patch.across, patch.along), a * b);
   const T slant = dot(n, beam.axis), reach = dot(n, patch.centre) / select(abs(slant) > T(0.01), slant, T(0.01));
   const Vec3<T> middle = beam.axis * reach - patch.centre;
   // The cone meets the lamp's plane within a circle about its axis. The circle is larger if the axis is oblique.

@@ -32,6 +32,7 @@ AimedSteps record_steps() {
     lobe.sinRadius = Expr::input(of("radius"));
     lobe.cosEnd = Expr::input(of("end"));
     lobe.extent = Expr::input(of("extent"));
+    lobe.rise = Expr::input(of("rise"));
     return lobe;
   };
   const auto patch_named = [](const std::string& name) {
@@ -72,8 +73,10 @@ AimedSteps record_steps() {
     p.output("lobe_radius", lamp.lobe.sinRadius);
     p.output("lobe_end", lamp.lobe.cosEnd);
     p.output("lobe_extent", lamp.lobe.extent);
+    p.output("lobe_rise", lamp.lobe.rise);
     p.output("lobe_height", lamp.height);
-    p.output("lamp_emphasis", lamp.emphasis);
+    p.output("lamp_density", lamp.density);
+    p.output("lamp_rise", lamp.mean_rise);
     p.output("lamp_solid_angle", lamp.solid_angle);
   });
   const Vec3<Expr> horizon = input_vector("horizon");
@@ -81,10 +84,19 @@ AimedSteps record_steps() {
   steps.cut = record_step([&](Program& p) {
     AimedLamp<Expr> lamp;
     lamp.lobe = lobe_named("lobe");
-    lamp.emphasis = Expr::input("lamp_emphasis");
+    lamp.mean_rise = Expr::input("lamp_rise");
     const AimedLamp<Expr> cut = cut_off(lamp, shining, horizon, Expr::input("v_1"), Expr::input("v_2"));
     p.output("wi", cut.wi);
-    p.output("lamp_emphasis", cut.emphasis);
+    p.output("lamp_density", cut.density);
+    p.output("lamp_rise", cut.mean_rise);
+  });
+  steps.emphasis = record_step([&](Program& p) {
+    AimedLamp<Expr> lamp;
+    lamp.lobe = lobe_named("lobe");
+    lamp.wi = input3("wi");
+    lamp.density = Expr::input("lamp_density");
+    lamp.mean_rise = Expr::input("lamp_rise");
+    p.output("lamp_emphasis", emphasis_of(lamp));
   });
   const Rgb<Expr> value = Rgb<Expr>::input("excess");
   const Expr density = Expr::input("drawn_density");
@@ -95,9 +107,8 @@ AimedSteps record_steps() {
     AimedLamp<Expr> lamp;
     lamp.height = Expr::input("lobe_height");
     lamp.lobe.extent = Expr::input("lobe_extent");
-    lamp.emphasis = Expr::input("lamp_emphasis");
     lamp.solid_angle = Expr::input("lamp_solid_angle");
-    const Sent<Expr> sent = send(lamp, value, density);
+    const Sent<Expr> sent = send(lamp, Expr::input("lamp_emphasis"), value, density);
     p.output("lobe_value", sent.value);
     p.output("lobe_weight", sent.weight);
     p.output("lobe_colour", sent.colour);

@@ -14,11 +14,13 @@ struct AimedSteps {
                     ///< replaces the lamp)
   Recording above;  ///< reads the lamp; assigns lamp_above, the height of its highest point
   Recording room;   ///< reads an earlier lobe and the lamp's centre; assigns lobe_room
-  Recording aim;    ///< reads the lamp, shining_*, lobe_room, v_1, v_2, wo_*; assigns wi_*, lamp_emphasis,
-                  ///< lamp_solid_angle, lobe_height, and the lobe's to_lamp_*, to_half_*, exponent, radius, end, extent
+  Recording
+      aim;  ///< reads the lamp, shining_*, lobe_room, v_1, v_2, wo_*; assigns wi_*, lamp_density, lamp_rise,
+            ///< lamp_solid_angle, lobe_height, and the lobe's to_lamp_*, to_half_*, exponent, radius, end, extent, rise
   Recording low;  ///< reads the lamp and the horizon; assigns lamp_low, the height of its lowest point over the horizon
-  Recording cut;  ///< reads the inputs and results of aim, the lobe and the horizon; changes wi_* and lamp_emphasis
-  Recording less;   ///< reads an earlier lobe and wi_*; subtracts the lobe from excess
+  Recording cut;  ///< reads the inputs of aim, the lobe and the horizon; changes wi_*, lamp_density, lamp_rise
+  Recording emphasis;  ///< reads wi_*, the lobe, lamp_density and lamp_rise; assigns lamp_emphasis
+  Recording less;      ///< reads an earlier lobe and wi_*; subtracts the lobe from excess
   Recording send;   ///< reads excess, drawn_density and the results of aim; assigns the lobe's value, weight and colour
   Recording toss;   ///< assigns u_0 and tossed, the index of a lobe or a negative number
   Recording under;  ///< reads the chosen lobe, u_1, u_2; assigns drawn_*

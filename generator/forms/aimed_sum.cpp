@@ -21,14 +21,15 @@ AimedSum aimed_sum(const Brdf<double>& brdf, const ClosureSum<double>& base,
     for (const AimedLobe<double>& earlier : out.lobes) room = std::min(room, room_beside(lit.lamp.centre, earlier));
     AimedLamp<double> lamp = aim_at(lit.lamp, lit.mean, room, v[i][0], v[i][1], wo);
     if (horizon && lowest(lit.lamp, *horizon) < 0) lamp = cut_off(lamp, lit.mean, *horizon, v[i][0], v[i][1]);
-    if (lamp.emphasis == 0) continue;
+    const double emphasis = emphasis_of(lamp);
+    if (emphasis == 0) continue;
     Excess<double> there = excess_at(lamp.wi);
     for (std::size_t k = 0; k < out.lobes.size(); ++k)
       there.value = there.value - out.values[k] * evaluate(out.lobes[k], lamp.wi);
     of.push_back(lit.lamp);
     solid_angles.push_back(lamp.solid_angle);
     out.lobes.push_back(lamp.lobe);
-    out.values.push_back(send(lamp, there.value, there.density).value);
+    out.values.push_back(send(lamp, emphasis, there.value, there.density).value);
   }
   const auto count = double(out.lobes.size());
   const Toss<double> tossed = toss(u.x, count);

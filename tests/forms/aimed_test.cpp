@@ -203,8 +203,8 @@ TEST(Aimed, NoPointOfALampStandsForTheWholeOfIt) {
     const LampPatch<double> lamp =
         disk(direction(0.1 * measure::uniform(random), turn) * 2.0, 0.2 * measure::uniform(random));
     const AimedLamp<double> aim = aim_at(lamp, lamp, 1.0, measure::uniform(random), measure::uniform(random), wo);
-    aimed += aim.emphasis > 0;
-    ASSERT_LE(aim.emphasis, 12) << i;
+    aimed += emphasis_of(aim) > 0;
+    ASSERT_LE(emphasis_of(aim), 12) << i;
   }
   EXPECT_GT(aimed, 5000);
 }
@@ -228,7 +228,7 @@ TEST(Aimed, ASlopeOverTheLampIsNotCountedTwice) {
         AimedLamp<double> aimed;
         for (int i = 0; i < kSteps * kSteps; ++i) {
           aimed = aim_at(lamp, lamp, 1.0, (i / kSteps + 0.5) / kSteps, (i % kSteps + 0.5) / kSteps, wo);
-          mean += brdf->eval(aimed.wi, wo).g * aimed.wi.z * aimed.emphasis / (kSteps * kSteps);
+          mean += brdf->eval(aimed.wi, wo).g * aimed.wi.z * emphasis_of(aimed) / (kSteps * kSteps);
         }
         const double lit = over_patch(lamp, 1, [&](const Vec3<double>& w) { return evaluate(aimed.lobe, w); });
         const double truth = over_patch(lamp, 1, [&](const Vec3<double>& w) { return brdf->eval(w, wo).g * w.z; });
@@ -271,8 +271,8 @@ TEST(Aimed, AConeBoundsWhatIsAveragedOver) {
               AimedLamp<double> aimed;
               for (int i = 0; i < kSteps * kSteps; ++i) {
                 aimed = aim_at(patch, shining, room, (i / kSteps + 0.5) / kSteps, (i % kSteps + 0.5) / kSteps, wo);
-                EXPECT_LT(aimed.emphasis, 10);
-                mean += brdf->eval(aimed.wi, wo).g * std::max(aimed.wi.z, 0.0) * aimed.emphasis / (kSteps * kSteps);
+                EXPECT_LT(emphasis_of(aimed), 10);
+                mean += brdf->eval(aimed.wi, wo).g * std::max(aimed.wi.z, 0.0) * emphasis_of(aimed) / (kSteps * kSteps);
               }
               const double lit = over_patch(lamp, 1, [&](const auto& w) { return beam(w) * evaluate(aimed.lobe, w); });
               const double truth =
@@ -335,7 +335,8 @@ TEST(Aimed, OfALampThatReachesBelowTheHorizonThePartAboveCounts) {
                     EXPECT_GT(dot(aimed.wi, horizon), -1e-9);
                     EXPECT_TRUE(meets(lamp, aimed.wi));
                   }
-                  mean += brdf->eval(aimed.wi, wo).g * std::max(aimed.wi.z, 0.0) * aimed.emphasis / (kSteps * kSteps);
+                  mean +=
+                      brdf->eval(aimed.wi, wo).g * std::max(aimed.wi.z, 0.0) * emphasis_of(aimed) / (kSteps * kSteps);
                 }
                 const double lit =
                     over_patch(lamp, 1, [&](const auto& w) { return above(w, evaluate(aimed.lobe, w)); });
