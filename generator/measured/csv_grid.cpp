@@ -5,7 +5,7 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
-#include <ranges>
+#include <span>
 #include <sstream>
 
 #include "core/csv.h"
@@ -108,8 +108,8 @@ Measurement read_csv_grid(const std::filesystem::path& path) {
         "{}: theta_i, theta_o: expected degrees, and the largest is {}: name the columns {} for angles in radians, {} "
         "for such small ones",
         name, degrees(std::max(*rows.axis(0).rbegin(), *rows.axis(2).rbegin())),
-        join(names_of(Columns::Radians) | std::views::take(4), ","),
-        join(names_of(Columns::Degrees) | std::views::take(4), ","));
+        join(std::span(names_of(Columns::Radians)).first(4), ","),
+        join(std::span(names_of(Columns::Degrees)).first(4), ","));
   Measurement out;
   if (!csv.others().empty())
     out.notes.push_back(fmt::format("{} not known and not read: {}",
