@@ -87,7 +87,7 @@ template <class T> T evaluate(const AimedLobe<T>& lobe, const Vec3<T>& wi) {
 /// The radius, as a sine, that a lobe towards `centre` may have without covering the lamp of an earlier lobe. If it
 /// covered that lamp, the drawn directions would have to subtract the overlap, which is as bright as the lamp.
 template <class T> T room_beside(const Vec3<T>& centre, const AimedLobe<T>& earlier) {
-  return length(divided(centre, length(centre)) - earlier.towards) - earlier.sinRadius;
+  return length(unit(centre) - earlier.towards) - earlier.sinRadius;
 }
 
 /// The lobe for a lamp whose bounding sphere has this sine of its angular radius. wo: unit vector to the viewer.
@@ -102,7 +102,7 @@ template <class T> AimedLobe<T> aim(const Vec3<T>& towards, const T& sinRadius, 
   const T sinWidth = minimum(maximum(wide, sinRadius + T(kTight)), T(kMost));
   AimedLobe<T> lobe;
   lobe.towards = towards;
-  lobe.half = divided(towards + wo, length(towards + wo));
+  lobe.half = unit(towards + wo);
   // cos^e = kLevel / 7 at the width
   const T log_cos2 = log1p(-sqr(sinWidth)), drop = expm1(T(end / (2 * level)) * log_cos2);
   lobe.exponent = T(2 * level) / log_cos2;
@@ -119,7 +119,7 @@ template <class T> Vec3<T> sample_under(const AimedLobe<T>& lobe, const T& u, co
   const T drop = u * lobe.extent / (T(2) * pi<T>()), sine = sqrt(drop * (T(2) - drop)), turn = T(2) * pi<T>() * v;
   const auto upright = abs(lobe.towards.z) > T(0.9);
   const Vec3<T> side = cross(lobe.towards, Vec3<T>{select(upright, T(1), T(0)), T(0), select(upright, T(0), T(1))});
-  const Vec3<T> t = divided(side, length(side));
+  const Vec3<T> t = unit(side);
   const Vec3<T> b = cross(lobe.towards, t);
   return lobe.towards * (T(1) - drop) + t * (sine * cos(turn)) + b * (sine * sin(turn));
 }
@@ -160,7 +160,7 @@ template <class T> Against<T> against(const LampPatch<T>& patch, const Vec3<T>& 
   const auto near = (on && beyond) || (!on && reach > T(0) && !beyond);
   const Vec3<T> to = patch.at(select(disk, x * round, select(off_x, select(x > T(0), end_x, -end_x), x)),
                               select(disk, y * round, select(off_y, select(y > T(0), end_y, -end_y), y)));
-  const Vec3<T> moved = divided(to, length(to));
+  const Vec3<T> moved = unit(to);
   const auto moves = near && moved.z * drawn.z > T(0);
   return {select(on, T(1), T(0)), select(moves, T(1), T(0)), select(moves, moved, drawn)};
 }
@@ -214,7 +214,7 @@ template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const LampPatc
   const auto round = shining.disk > T(0.5);
   const Vec3<T> point = shining.at(select(round, radius * cos(angle), T(2) * v1 - T(1)),
                                    select(round, radius * sin(angle), T(2) * v2 - T(1)));
-  lamp.wi = divided(point, length(point));
+  lamp.wi = unit(point);
   // Its length is the lamp's area divided by 4 or pi.
   const Vec3<T> normal = cross(patch.across, patch.along);
   // Mean over the shining part by a four-point rule that is exact to degree 3 (A. Stroud: Approximate Calculation of
@@ -265,7 +265,7 @@ AimedLamp<T> cut_off(AimedLamp<T> lamp, const LampPatch<T>& shining, const Vec3<
               });
   const T mean_rise = turns[2] / T(2 * kSteps);
   const Vec3<T> point{turns[3], turns[4], turns[5]};
-  lamp.wi = divided(point, length(point));
+  lamp.wi = unit(point);
   lamp.density = turns[6];
   // If the lobe's normal lies below the plane, the lobe is black everywhere above it.
   const auto shows = lamp.mean_rise > T(0) && dot(lamp.lobe.half, normal) > T(0);

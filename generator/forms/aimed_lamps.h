@@ -13,6 +13,7 @@ namespace brdfc::forms {
 
 /// v / s with one division: OSL checks the result of each, and the checks take long to compile.
 template <class T> Vec3<T> divided(const Vec3<T>& v, const T& s) { return v * (T(1) / s); }
+template <class T> Vec3<T> unit(const Vec3<T>& v) { return divided(v, length(v)); }
 
 /// A lamp as a flat patch, in any unit of length: a rectangle, or a disk or ellipse, with these half axes. For a sun
 /// the centre is at distance 1.
