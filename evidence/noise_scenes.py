@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import bpy
 import numpy as np
-from mathutils import Vector
+from mathutils import Matrix, Vector
 
 #: Side of the picture in pixels; the ball takes 6/7 of it.
 SIZE = 42
@@ -178,6 +178,13 @@ def window(scene, _folder):
             pane.location += x * axes[0] + y * axes[1]
 
 
+def softboxes(scene, _folder):
+    """Adds an arc of five softboxes of 1.8 m that face the ball. Circles around them overlap."""
+    for degrees in range(-60, 61, 30):
+        turn = Matrix.Rotation(math.radians(degrees), 3, "Z")
+        lamp(scene, "AREA", f"At {degrees}", turn @ TOWARDS, share=0.2, shape="SQUARE", size=1.8)
+
+
 def emissive_ball(scene, _folder):
     radius, distance = 0.2, 4.0
     strength = IRRADIANCE * distance**2 / (math.pi * radius**2)
@@ -306,6 +313,7 @@ CONDITIONS = {
 FLAT_CONDITIONS = {
     "strip": Condition("strip, 2 x 0.3 m", strip, "point"),
     "window": Condition("four panes of 0.5 m", window, "point"),
+    "softboxes": Condition("five softboxes of 1.8 m", softboxes, "point"),
 }
 
 

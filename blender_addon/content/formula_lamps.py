@@ -28,7 +28,7 @@ _SEEN = [
 ]
 #: Vectors of a slot, and what its shape's first number consists of.
 SLOT = ("place", "turn", "scale", "shape")
-_CODED = [["kind", "FLOAT"], ["most", "FLOAT"], ["plane", "FLOAT"]]
+_CODED = [["kind", "FLOAT"], ["most", "FLOAT"], ["cluster", "FLOAT"]]
 _AXES = [
     ["across", "VECTOR"],
     ["along", "VECTOR"],
@@ -53,12 +53,12 @@ def _decoded(w, shape, cones):
     many a lamp may have here."""
     whole = w.separate(shape)[0]
     code = w.math("FLOOR", w.math("DIVIDE", whole, slots.CODE))
-    plane = w.math("FLOOR", w.math("DIVIDE", code, slots.CODE))
-    most = w.math("MULTIPLY_ADD", plane, -slots.CODE, w.math("ADD", code, 1.0))
+    cluster = w.math("FLOOR", w.math("DIVIDE", code, slots.CODE))
+    most = w.math("MULTIPLY_ADD", cluster, -slots.CODE, w.math("ADD", code, 1.0))
     return {
         "kind": w.math("MULTIPLY_ADD", code, -slots.CODE, whole),
         "most": w.math("MINIMUM", most, float(cones)),
-        "plane": plane,
+        "cluster": cluster,
     }
 
 
@@ -158,16 +158,16 @@ def _lamp_group(parts, cones):
 
 def _pair_group():
     """The group that computes the angle between two lamps, as far as they can be in each other's
-    way: not if the later one is not in use, or both lie beside each other in one plane."""
+    way: not if the later one is not in use, or both are of one cluster (lamps/slots.py)."""
 
     def fill(w, found):
-        same = w.math("COMPARE", found["plane"], found["other_plane"], 0.5)
-        same = w.math("MULTIPLY", same, w.math("GREATER_THAN", found["plane"], 0.5))
+        same = w.math("COMPARE", found["cluster"], found["other_cluster"], 0.5)
+        same = w.math("MULTIPLY", same, w.math("GREATER_THAN", found["cluster"], 0.5))
         angle = w.vector("DISTANCE", found["towards"], found["other_towards"], output="Value")
         return {"angle": w.mix(found["used"], _FAR, w.mix(same, angle, _FAR))}
 
     inputs = [["towards", "VECTOR"], ["other_towards", "VECTOR"]]
-    inputs += [[name, "FLOAT"] for name in ("plane", "other_plane", "used")]
+    inputs += [[name, "FLOAT"] for name in ("cluster", "other_cluster", "used")]
     return make_group("lamp pair", ["lamp pair"], inputs, [["angle", "FLOAT"]], fill)
 
 
@@ -205,7 +205,7 @@ def _later_group():
 _MOVED = ("layout", "clear", "of_cones", "aim")
 _MOST_ASIDE = 4
 #: What _keep_apart() needs to know of a lamp besides the inputs of the part "aside".
-_BOUNDS = ("towards", "reach", "flat", "used", "active", "above", "plane", *_MOVED)
+_BOUNDS = ("towards", "reach", "flat", "used", "active", "above", "cluster", *_MOVED)
 #: What it decides.
 _DECIDED = ("shown", "lit", "room", *_MOVED)
 
@@ -255,7 +255,7 @@ def _decide(w, parts, lamps, at, widest):
     pair, step, angles = _pair_group(), _later_group(), {}
     for i, lamp in enumerate(lamps):
         for j, other in enumerate(lamps[i + 1 :], i + 1):
-            of_other = {f"other_{name}": other[name] for name in ("towards", "plane")}
+            of_other = {f"other_{name}": other[name] for name in ("towards", "cluster")}
             given = lamp | of_other | {"used": other["used"]}
             angles[i, j] = angles[j, i] = add_group(w, pair, given, "")["angle"]
     for i, lamp in reversed(list(enumerate(lamps))):

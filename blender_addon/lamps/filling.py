@@ -62,33 +62,33 @@ def _cones(chosen, budget):
     return [count for _, count in sorted(zip(order, counts, strict=True))]
 
 
-def _planes(chosen):
-    """The number of the plane of each chosen lamp; 0 if it is not flat, or if no other chosen lamp
-    lies beside it there. Lamps with the same number do not overlap."""
-    planes, members = [0] * len(chosen), []
+def _clusters(chosen):
+    """A number for each chosen lamp: lamps with the same number never overlap. 0 if it is not flat,
+    or if no other chosen lamp has its number."""
+    clusters, members = [0] * len(chosen), []
     for i, candidate in enumerate(chosen):
         sheet = candidate.sheet
         if sheet is None or not sheet.stays:
             continue
         for group in members:
-            if all(chosen[j].sheet.is_beside(sheet) for j in group):
+            if all(chosen[j].sheet.never_overlaps(sheet) for j in group):
                 group.append(i)
                 break
         else:
             members.append([i])
-    for plane, group in enumerate((g for g in members if len(g) > 1), 1):
+    for cluster, group in enumerate((g for g in members if len(g) > 1), 1):
         for i in group:
-            planes[i] = plane
-    return planes
+            clusters[i] = cluster
+    return clusters
 
 
 def _numbers(chosen, budget):
     """The numbers of the slots of the chosen lamps."""
-    cones, planes = _cones(chosen, budget), _planes(chosen)
-    if (max(cones, default=1) > 1 or any(planes)) and not _are_codes_read():
+    cones, clusters = _cones(chosen, budget), _clusters(chosen)
+    if (max(cones, default=1) > 1 or any(clusters)) and not _are_codes_read():
         return [c.values for c in chosen]
-    found = zip(chosen, cones, planes, strict=True)
-    return [slots.coded(c.values, count, plane) for c, count, plane in found]
+    found = zip(chosen, cones, clusters, strict=True)
+    return [slots.coded(c.values, count, cluster) for c, count, cluster in found]
 
 
 def _worth_aiming(survey):
@@ -145,7 +145,8 @@ def _fill(scene, depsgraph, subject=None, keep=True):
         filled = _numbers(chosen, budget)
         wanted = [v for numbers in filled for v in numbers]
         wanted += [*empty] * (slots.SLOTS - len(chosen))
-        survey.beside = {c.name for c, n in zip(chosen, filled, strict=True) if slots.plane_of(n)}
+        sheets = {c.name for c in chosen if c.sheet is not None}
+        survey.sheets = sheets if len(sheets) > 1 else set()
         for (socket, _), old, new in zip(sockets, now, wanted, strict=True):
             # Writes only what changed: each change recompiles shaders and calls handlers again.
             if not shared_group.same(old, new):

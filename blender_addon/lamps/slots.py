@@ -20,9 +20,9 @@ PARTS = ("LampPlace", "LampTurn", "LampScale", "LampShape")
 #: slot is above a whole one belongs to the kinds that have that shape (kinds/).
 EMPTY, BALL, SUN, RECTANGLE, ELLIPSE, SKY_SUN = range(6)
 #: The number of the shape of a rectangle or an ellipse is increased by CODE times the number of
-#: cones that it may have less one, and by CODE squared times the number of its plane, if there are
-#: others in that plane. Formula Nodes read both (content/formula_lamps.py), other shaders skip
-#: them.
+#: cones that it may have less one, and by CODE squared times the number of its cluster, if there
+#: are others in it: lamps of a cluster never overlap. Formula Nodes read both
+#: (content/formula_lamps.py), other shaders skip them.
 CODE = 8.0
 #: Most cones of a flat lamp. Formula Nodes have a closure for each, and compute the model for it.
 MOST_CONES = 4
@@ -141,7 +141,8 @@ class Driven:
 @dataclass(frozen=True)
 class Sheet:
     """A flat lamp in world space: its centre, its axes as rows, the last of which is the normal,
-    its two sizes, and whether it keeps its place without the extension."""
+    its two sizes, and whether it keeps its place without the extension. It shines against its
+    normal."""
 
     centre: np.ndarray
     axes: np.ndarray
@@ -152,13 +153,23 @@ class Sheet:
         """How many cones it should have (generator/forms/node_cones.h)."""
         return MOST_CONES if min(self.sizes) > 0 else 1
 
-    def is_beside(self, other):
-        """Whether both are in one plane, shine the same way and do not overlap, in the directions
-        of this one's axes."""
-        away = (other.centre - self.centre) @ self.axes.T
+    def never_overlaps(self, other):
+        """Whether no ray from a point on which both shine meets both. None does if neither lamp has
+        a part behind the other's plane, like panels of a ceiling, or softboxes that face a subject
+        between them: the ray is behind the plane of a lamp once it has met it."""
         least = 1e-4 * max(*self.sizes, *other.sizes)
-        if self.axes[2] @ other.axes[2] < 1 - 1e-6 or abs(away[2]) > least:
+        if self._depth_of(other) > least or other._depth_of(self) > least:
             return False
+        return self.axes[2] @ other.axes[2] < 1 - 1e-6 or self._is_beside(other, least)
+
+    def _depth_of(self, other):
+        """How far a rectangle about the other lamp reaches behind the plane of this one."""
+        reach = np.abs(other.axes[:2] @ self.axes[2]) @ np.array(other.sizes) / 2
+        return (other.centre - self.centre) @ self.axes[2] + reach
+
+    def _is_beside(self, other, least):
+        """Whether a lamp in the same plane lies beside this one, in the directions of its axes."""
+        away = (other.centre - self.centre) @ self.axes.T
         cosines = np.abs(other.axes[:2] @ self.axes[:2].T)
         gaps = np.abs(away[:2]) - (np.array(self.sizes) + np.array(other.sizes) @ cosines) / 2
         return bool(gaps.max() > -least)
@@ -210,10 +221,10 @@ def _with_shape(values, shape):
     return (*values[:_SHAPE], shape, *values[_SHAPE + 1 :])
 
 
-def coded(values, cones, plane):
-    """The numbers of a flat lamp that may have this number of cones, in a plane with this number: 0
-    if it is alone there."""
-    shape, added = values[_SHAPE], CODE * (cones - 1 + CODE * plane)
+def coded(values, cones, cluster):
+    """The numbers of a flat lamp that may have this number of cones, in a cluster with this number:
+    0 if it is alone."""
+    shape, added = values[_SHAPE], CODE * (cones - 1 + CODE * cluster)
     if isinstance(shape, Driven):
         shape = replace(shape, added=shape.added + added)
     else:
@@ -224,11 +235,6 @@ def coded(values, cones, plane):
 def _code_of(shape):
     number = shape.added if isinstance(shape, Driven) else shape
     return 0 if number is None else math.floor(number / CODE)
-
-
-def plane_of(values):
-    """The number of the plane that coded() was given."""
-    return _code_of(values[_SHAPE]) // int(CODE)
 
 
 def decoded(values):

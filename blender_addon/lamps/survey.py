@@ -15,8 +15,8 @@ class Survey:
     instancers: set = field(default_factory=set)  # names of objects that instance lamps
     #: slots.transform_kind() of lamps that drivers follow, by name.
     transforms: dict = field(default_factory=dict)
-    #: Names of flat lamps whose slots say that others lie beside them in their plane.
-    beside: set = field(default_factory=set)
+    #: Names of flat lamps, if there are several: where they are decides whether they may overlap.
+    sheets: set = field(default_factory=set)
     #: Points at which lamps are ranked, (n, 3).
     subject: object = None
 

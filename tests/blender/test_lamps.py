@@ -188,7 +188,7 @@ def slots(scene, update=True):
 
 
 def codes(scene):
-    """[(number of cones, number of the plane)] of the filled slots."""
+    """[(number of cones, number of the cluster)] of the filled slots."""
     found = [int(slot[9] // 8) for slot in coded_slots(scene)]
     return [(code % 8 + 1, code // 8) for code in found]
 
@@ -324,36 +324,54 @@ def test_cones_of_flat_lamps(extension, ball, empty, monkeypatch):
     assert codes(empty) == [(1, 0), (1, 0)]
 
 
-def test_lamps_beside_each_other(extension, ball, empty):
+def test_lamps_that_never_overlap(extension, ball, empty):
     """Panes of a window have one number, lamps that can hide each other have none."""
 
-    def planes():
-        return sorted(plane for _, plane in codes(empty))
+    def clusters():
+        return sorted(cluster for _, cluster in codes(empty))
 
     panes = [
         add_lamp(empty, "AREA", f"Pane {i}", (i % 2, i // 2, 3), (0, 0, 0), shape="SQUARE", size=1)
         for i in range(4)
     ]
-    assert planes() == [1] * 4
+    assert clusters() == [1] * 4
     panes[3].location.z = 3.1
-    assert planes() == [0, 1, 1, 1]
+    assert clusters() == [0, 1, 1, 1]
     panes[3].location.z = 3
     extension.api.see_lamps(empty)  # as before a render
-    assert planes() == [1] * 4
+    assert clusters() == [1] * 4
     panes[3].location.x = 0.9  # it overlaps Pane 2
-    assert planes() == [0, 1, 1, 1]
+    assert clusters() == [0, 1, 1, 1]
     panes[3].location.x = 5
-    panes[3].rotation_euler = (math.pi, 0, 0)  # it shines the other way
-    assert planes() == [0, 1, 1, 1]
+    panes[3].rotation_euler = (math.pi, 0, 0)  # nothing is lit by it and by the others
+    assert clusters() == [1] * 4
+    panes[3].location = (0, 0, 6)  # it shines on the backs of the others
+    assert clusters() == [0, 1, 1, 1]
     for pane in panes[1:]:
         bpy.data.objects.remove(pane)
-    assert planes() == [0]
+    assert clusters() == [0]
     disk = add_lamp(empty, "AREA", "Disk", (1.1, 0.2, 3), (0, 0, 1), shape="DISK", size=0.5)
-    assert planes() == [1, 1]
+    assert clusters() == [1, 1]
     # Without the extension nobody would see that it has moved over the other.
     disk.keyframe_insert("location", frame=1)
     extension.api.see_lamps(empty)
-    assert planes() == [0, 0]
+    assert clusters() == [0, 0]
+
+
+def test_softboxes_around_a_subject_never_overlap(extension, ball, empty):
+    """Each is in front of the plane of every other one, although circles around them overlap."""
+    for angle in np.radians(range(-80, 81, 40)):
+        add_lamp(
+            empty, "AREA", f"At {angle:.1f}", (4 * np.sin(angle), -4 * np.cos(angle), 0),
+            (math.pi / 2, 0, angle), shape="SQUARE", size=2.6,
+        )  # fmt: skip
+    assert [cluster for _, cluster in codes(empty)] == [1] * 5
+    # A point may see this one through one of the others.
+    behind = add_lamp(empty, "AREA", "Behind", (0, -9, 0), (math.pi / 2, 0, 0), size=2.6)
+    assert sorted(cluster for _, cluster in codes(empty)) == [0] + [1] * 5
+    behind.location.y = 9
+    behind.rotation_euler.z = math.pi
+    assert [cluster for _, cluster in codes(empty)] == [1] * 6
 
 
 def test_quaternions_are_of_one_sign(ball, empty):

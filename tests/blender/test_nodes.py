@@ -121,6 +121,15 @@ def flat_lamps(scene):
     )  # fmt: skip
 
 
+def softboxes(scene):
+    """They face the ball; circles around neighbours overlap."""
+    for angle in np.radians((-60, -20, 20, 60)):
+        add_lamp(
+            scene, "AREA", f"At {angle:.1f}", (4 * np.sin(angle), -4 * np.cos(angle), 0),
+            (math.pi / 2, 0, angle), energy=150, shape="SQUARE", size=2.4,
+        )  # fmt: skip
+
+
 def one_before_the_other(scene):
     """Lamps whose cones overlap as seen from the ball."""
     add_lamp(scene, "POINT", "Near", (-2, -4, 3), energy=300, shadow_soft_size=0.6)
@@ -213,7 +222,14 @@ def window_and_sun(scene, turned=0.0, shape="SQUARE"):
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "light",
-    [lamps, flat_lamps, one_before_the_other, window_and_sun, a_spot_behind_one_turned_away],
+    [
+        lamps,
+        flat_lamps,
+        softboxes,
+        one_before_the_other,
+        window_and_sun,
+        a_spot_behind_one_turned_away,
+    ],
     ids=lambda f: f.__name__,
 )
 @pytest.mark.parametrize(("model", "values"), CASES)

@@ -180,5 +180,5 @@ class Light(Kind, ABC):
         # Drivers follow transforms, unless their kind changes; a new ranking needs a survey.
         known = survey.transforms.get(item.original.name_full)
         changed = slots.transform_kind(item.matrix_world) != known
-        beside = item.original.name in survey.beside
-        return changed or (known is not None and known[1]) or crowded or beside
+        among_sheets = item.original.name in survey.sheets
+        return changed or (known is not None and known[1]) or crowded or among_sheets
