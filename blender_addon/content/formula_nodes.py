@@ -124,6 +124,15 @@ def _direction(w, u, v):
     return w.combine(x, y, height)
 
 
+def _within(w, parameter, low, high):
+    """A parameter within its bounds, as a link may give it any value; None is no bound."""
+    for operation, bound in (("MAXIMUM", low), ("MINIMUM", high)):
+        if bound is not None:
+            compute = w.vector if isinstance(bound, list) else w.math
+            parameter = compute(operation, parameter, bound)
+    return parameter
+
+
 def wire(tree, data, normal, tangent, parameters, outputs_of_slots, cones, title):
     """Adds a model's nodes as a group. Returns the outputs by name: the BSDF, and the Albedo where
     the model consists of Blender's own closures only.
@@ -133,7 +142,6 @@ def wire(tree, data, normal, tangent, parameters, outputs_of_slots, cones, title
     `cones`: how many each lamp may have. `title`: prefix of the names of the new groups.
     """
     kinds = {name: kind for part in data["parts"].values() for name, kind in part["inputs"]}
-    kinds |= dict.fromkeys(data["bounds"], "FLOAT")
     values = {"Normal": (normal, "VECTOR"), "Tangent": (tangent, "VECTOR")}
     own = {name: f"parameter {name}" for name in parameters if name in kinds}
     values |= {own[name]: (parameters[name], kinds[name]) for name in own}
@@ -166,9 +174,8 @@ def _wired(w, data, normal, tangent, parameters, of_slots, cones, title):
     lists = {name: svm_constants.prepared(name, part) for name, part in data["parts"].items()}
     parts = Parts(w, lists, title, constants)
     parameters = dict(parameters)
-    for name, (low, high) in data["bounds"].items():
-        inside = w.math("MAXIMUM", parameters[name], low)
-        parameters[name] = w.math("MINIMUM", inside, high)
+    for name in parameters:
+        parameters[name] = _within(w, parameters[name], *data["bounds"].get(name, (None, None)))
     surface = _Surface(w, parts, geometry, normal, None if data["isotropic"] else tangent)
     side = w.math("MULTIPLY_ADD", surface.backfacing, -2.0, 1.0)
     given = {**parameters, **surface.wo, "side": side, "path_length": surface.path_length}

@@ -353,8 +353,12 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
     parts[name] = json_of(program);
     out.operations += int(program.operations.size());
   };
-  for (const ParamInfo& p : model.info().params)
-    if (p.kind == ParamKind::Number && !fixed.count(p.name)) bounds[p.name] = {p.min, p.max};
+  for (const ParamInfo& p : model.info().params) {
+    if (fixed.count(p.name)) continue;
+    const auto grey = [](double value) { return Json{value, value, value}; };
+    if (p.kind == ParamKind::Number) bounds[p.name] = {p.min, p.max};
+    if (p.kind == ParamKind::Color) bounds[p.name] = {grey(p.min), p.may_exceed ? Json() : grey(p.max)};
+  }
   if (model.info().look != Look::Matte) add("bend", record_bend());
   add("raise", record_raise());
   Recorder recorder;

@@ -39,16 +39,24 @@ std::string parameter(const ParamInfo& p) {
   }
 }
 
-/// Prints a shader's statements, with the numbers that are sockets clamped to their ranges: sliders stay within them,
-/// but linked values may not, for example a black texture. The count does not include the statements that clamp.
+/// A parameter within its range. Colors may be brighter, as in Blender, unless that has no meaning.
+Value within_range(const ParamInfo& p) {
+  if (p.kind == ParamKind::Number) return call("clamp", {p.name, p.min, p.max});
+  const auto grey = [](double value) { return call("color", {value}); };
+  return p.may_exceed ? call("max", {p.name, grey(p.min)}) : call("clamp", {p.name, grey(p.min), grey(p.max)});
+}
+
+/// Prints a shader's statements, with the sockets clamped to their ranges: sliders stay within them, but linked values
+/// may not, for example a black texture or the sum of two. The count does not include the statements that clamp.
 print::OslText within_ranges(const ModelInfo& info, const ParamValues& fixed, const Statements& statements) {
   const std::set<std::string> read = print::names_in(statements);
   Statements bounds, bounded;
   for (const ParamInfo& p : info.params) {
-    if (p.kind != ParamKind::Number || fixed.count(p.name) || !read.count(p.name)) continue;
+    if (p.kind == ParamKind::Choice || fixed.count(p.name) || !read.count(p.name)) continue;
     // A parameter cannot be assigned to, but a variable of the same name can hide it.
-    bounds.push_back(print::declare("float", "bounded_" + p.name, call("clamp", {p.name, p.min, p.max})));
-    bounded.push_back(print::declare("float", p.name, "bounded_" + p.name));
+    const char* type = p.kind == ParamKind::Color ? "color" : "float";
+    bounds.push_back(print::declare(type, "bounded_" + p.name, within_range(p)));
+    bounded.push_back(print::declare(type, p.name, "bounded_" + p.name));
   }
   if (bounds.empty()) return print::osl_statements(statements, 1);
   print::OslText out = print::osl_statements(statements, 2);

@@ -48,6 +48,8 @@ struct ParamInfo {
   ParamKind kind = ParamKind::Number;
   /// True if the parameter's effect depends on ratios of its values rather than on differences.
   bool by_factors = false;
+  /// Of a Color: whether it may be larger than `max` where a texture says so, as it only scales light.
+  bool may_exceed = true;
   Optical optical = Optical::None;
   /// The panel of a node, closed at first, that this parameter is in; "" if it is in none.
   std::string panel = "";
@@ -171,10 +173,17 @@ struct ColorSpec {
   const char* doc;
   Optical optical = Optical::None;
   const char* panel = "";
+  bool may_exceed = true;
 
   ColorSpec as(Optical what) const {
     ColorSpec out = *this;
     out.optical = what;
+    return out;
+  }
+  /// A color above 1 has no meaning.
+  ColorSpec at_most_one() const {
+    ColorSpec out = *this;
+    out.may_exceed = false;
     return out;
   }
   ColorSpec in(const char* which) const {
@@ -208,11 +217,26 @@ struct SchemaVisitor {
                    {},
                    ParamKind::Number,
                    s.factors,
+                   true,
                    s.optical,
                    s.panel});
   }
   template <class T> void operator()(Rgb<T>&, const ColorSpec& s) const {
-    out.push_back({s.name, s.label, "", s.doc, 0, 1, 0, 1, s.value, {}, ParamKind::Color, false, s.optical, s.panel});
+    out.push_back({s.name,
+                   s.label,
+                   "",
+                   s.doc,
+                   0,
+                   1,
+                   0,
+                   1,
+                   s.value,
+                   {},
+                   ParamKind::Color,
+                   false,
+                   s.may_exceed,
+                   s.optical,
+                   s.panel});
   }
   void operator()(Choice&, const ChoiceSpec& s) const {
     out.push_back({s.name,

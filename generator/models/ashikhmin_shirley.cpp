@@ -120,8 +120,9 @@ template <class T> struct AshikhminShirley {
   }
 
   template <class Visitor> void parameters(const Visitor& v) {
-    v(rs, ColorSpec{"rs", "Specular Reflectance", {0.05, 0.05, 0.05}, "Mirror reflectance at normal incidence, R_s"}.as(
-              Optical::Reflectance));
+    v(rs, ColorSpec{"rs", "Specular Reflectance", {0.05, 0.05, 0.05}, "Mirror reflectance at normal incidence, R_s"}
+              .as(Optical::Reflectance)
+              .at_most_one());
     v(rd, ColorSpec{"rd", "Diffuse Reflectance", {0.5, 0.5, 0.5}, "Albedo of the diffuse substrate, R_d"});
     v(nu, NumberSpec{"nu", "Exponent U", 100, 0, 1e8, 0, 10000, "Phong exponent along the tangent, n_u"}.by_factors());
     v(nv, NumberSpec{"nv", "Exponent V", 100, 0, 1e8, 0, 10000, "Phong exponent across the tangent, n_v"}.by_factors());

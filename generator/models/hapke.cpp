@@ -63,11 +63,11 @@ template <class T> struct Hapke {
   }
 
   template <class Visitor> void parameters(const Visitor& v) {
-    v(w,
-      ColorSpec{"w",
-                "Particle Albedo",
-                {0.8, 0.8, 0.8},
-                "Share of the light that a particle scatters: 0.8 reflects about 40 % of the light, 0.5 about 20 %"});
+    v(w, ColorSpec{"w",
+                   "Particle Albedo",
+                   {0.8, 0.8, 0.8},
+                   "Share of the light that a particle scatters: 0.8 reflects about 40 % of the light, 0.5 about 20 %"}
+             .at_most_one());
     v(b, NumberSpec{"b", "Lobe Strength", 0.3, 0, 0.95, 0, 0.8,
                     "Particles scatter evenly with 0; larger values narrow their lobes"});
     v(c, NumberSpec{"c", "Backward", 0.4, -1, 1, -1, 1, "1: particles scatter backwards, to the lamp; -1: forwards"});

@@ -85,8 +85,9 @@ template <class T> struct Kelemen {
   }
 
   template <class Visitor> void parameters(const Visitor& v) {
-    v(f0, ColorSpec{"f0", "Normal Reflectance", {0.05, 0.05, 0.05}, "Reflectance of a facet seen from above"}.as(
-              Optical::Reflectance));
+    v(f0, ColorSpec{"f0", "Normal Reflectance", {0.05, 0.05, 0.05}, "Reflectance of a facet seen from above"}
+              .as(Optical::Reflectance)
+              .at_most_one());
     v(rm, ColorSpec{"rm",
                     "Matte Reflectance",
                     {0.8, 0.8, 0.8},

@@ -281,6 +281,18 @@ def add_balls_of_other_shaders(scene, api):
     api.add_coat(bpy.data.materials["coated"])
 
 
+def constant(tree, value):
+    """The output of a new node: of a number, or of a color that may have any value."""
+    if isinstance(value, tuple):
+        node = tree.nodes.new("ShaderNodeCombineColor")
+        for socket, channel in zip(node.inputs, value, strict=True):
+            socket.default_value = channel
+    else:
+        node = tree.nodes.new("ShaderNodeValue")
+        node.outputs[0].default_value = value
+    return node.outputs[0]
+
+
 def add_lamp(scene, kind="POINT", name="Lamp", location=(0, 0, 4), turn=(0, 0, 0), **settings):
     """Adds a lamp; `settings` are properties of its data, `turn` its Euler angles."""
     data = bpy.data.lights.new(name, kind)

@@ -10,7 +10,16 @@ import numpy as np
 import pytest
 import worlds
 from goniometer import Goniometer, tilted, unit
-from helpers import add_camera, add_lamp, add_sphere, add_world, compiled_once, evaluate, render
+from helpers import (
+    add_camera,
+    add_lamp,
+    add_sphere,
+    add_world,
+    compiled_once,
+    constant,
+    evaluate,
+    render,
+)
 from mathutils import Vector
 
 #: Directions towards the sun; the camera is above.
@@ -328,13 +337,15 @@ def test_a_link_takes_the_base_away_and_no_light(extension, empty, model):
     assert abs(whole) < bound < 0.05 * drawn.sum()
 
 
-#: Number sockets whose models break outside their ranges, and a value beyond either end.
+#: Sockets whose models break outside their ranges, and a value beyond either end.
 BEYOND = [
     ("cook_torrance", "m", -1.0),
     ("cook_torrance", "m", 50.0),
     ("ward", "ax", 50.0),
     ("phong", "e", -3.0),
     ("oren_nayar", "sigma", 100.0),
+    ("kelemen", "f0", (-2.0, -0.1, 3.0)),
+    ("disney", "base_color", (-2.0, -0.1, -0.1)),
 ]
 
 
@@ -345,13 +356,11 @@ def test_a_link_beyond_the_range_is_its_end(extension, empty, model, name, value
     (schema,) = [p for p in extension.api.models()[model]["parameters"] if p["name"] == name]
     extension.scene_loader.apply_clean_settings(empty, max_bounces=0)
     extension.api.enable_osl(empty)
-    end = min(max(value, schema["min"]), schema["max"])
+    end = np.clip(value, schema["min"], schema["max"]).tolist()
     made = [extension.api.new_material(model, "aimed", **{name: end}) for _ in range(2)]
     tree = made[1].node_tree
-    number = tree.nodes.new("ShaderNodeValue")
-    number.outputs[0].default_value = value
     (node,) = extension.model_nodes.group_nodes(made[1])
-    tree.links.new(number.outputs[0], extension.model_nodes.sockets(node)[name])
+    tree.links.new(constant(tree, value), extension.model_nodes.sockets(node)[name])
     pictures = []
     for material in made:
         # Around the half vector of sun and camera.

@@ -15,6 +15,7 @@ from helpers import (
     add_world,
     albedo,
     compiled_once,
+    constant,
     node_material,
     render,
     sphere_scene,
@@ -700,6 +701,33 @@ def test_links_and_ranges(extension, empty, tool):
     assert np.abs(beyond - plain).max() > 1e-3
     number.outputs[0].default_value = extension.pack.model("ward").parameters["ay"]["max"]
     np.testing.assert_array_equal(render(empty), beyond)
+
+
+@pytest.mark.parametrize(
+    ("model", "name", "value", "inside"),
+    [
+        ("disney", "base_color", (-0.5, 0.2, -0.1), (0.0, 0.2, 0.0)),
+        ("hapke", "w", (1.5, 0.5, -0.5), (1.0, 0.5, 0.0)),
+        ("lambert", "rho", (-1.0, 1.5, 0.5), (0.0, 1.5, 0.5)),
+    ],
+)
+def test_a_linked_color_is_not_negative(extension, empty, model, name, value, inside):
+    """A Noise Texture that is not normalised is; the weights of samples were then as large as
+    1e27. Above 1 a color scales light, unless it has no meaning there."""
+    settings(extension, empty, 16, osl=False, size=16)
+    material = extension.api.new_material(model, "nodes")
+    add_sphere(empty, material)
+    add_camera(empty)
+    lamps(empty)
+    extension.api.see_lamps(empty)
+    (node,) = extension.model_nodes.group_nodes(material)
+    tree, socket = material.node_tree, extension.model_nodes.sockets(node)[name]
+    pictures = []
+    for linked in (value, inside):
+        tree.links.new(constant(tree, linked), socket)
+        pictures.append(render(empty))
+    np.testing.assert_array_equal(*pictures)
+    assert np.isfinite(pictures[0]).all() and pictures[0].max() < 10
 
 
 def mean_of_four(extension, form, size, fill):

@@ -188,7 +188,7 @@ TEST(Shader, AModelWithoutScatteringIsItsDeltaTerms) {
   EXPECT_NEAR(lookup(table, model, {{"ks", 0.8}}, 0.5).g, 0.6, 1e-6);
 }
 
-TEST(Shader, KeepsThoseNumbersWithinTheirRangesThatItReads) {
+TEST(Shader, KeepsThoseParametersWithinTheirRangesThatItReads) {
   const detail::ModelOf<pack_test::Unread> model;
   const forms::Shader unread = forms::form("exact")->write(model, empty_table(model));
   EXPECT_THAT(unread.source, HasSubstr("float viewer = 0.5"));
@@ -198,6 +198,9 @@ TEST(Shader, KeepsThoseNumbersWithinTheirRangesThatItReads) {
   const forms::Shader read = forms::form("sampled")->write(ward, empty_table(ward));
   EXPECT_THAT(read.source, HasSubstr("float bounded_ax = clamp(ax, "));
   EXPECT_THAT(read.source, HasSubstr("float ax = bounded_ax;"));
+  EXPECT_THAT(read.source, HasSubstr("color bounded_ks = max(ks, color(0"));
+  EXPECT_THAT(forms::form("sampled")->write(find_model("hapke"), empty_table(find_model("hapke"))).source,
+              HasSubstr("color bounded_w = clamp(w, color(0"));
 }
 
 TEST(Shader, AFixedParameterLeavesTheText) {
