@@ -707,8 +707,8 @@ def test_links_and_ranges(extension, empty, tool):
     ("model", "name", "value", "inside"),
     [
         ("disney", "base_color", (-0.5, 0.2, -0.1), (0.0, 0.2, 0.0)),
-        ("hapke", "w", (1.5, 0.5, -0.5), (1.0, 0.5, 0.0)),
-        ("lambert", "rho", (-1.0, 1.5, 0.5), (0.0, 1.5, 0.5)),
+        ("kelemen", "f0", (1.5, 0.5, -0.5), (1.0, 0.5, 0.0)),
+        ("oren_nayar", "rho", (-1.0, 1.5, 0.5), (0.0, 1.5, 0.5)),
     ],
 )
 def test_a_linked_color_is_not_negative(extension, empty, model, name, value, inside):
