@@ -310,31 +310,21 @@ template <class T> struct Factors {
     return sample_if(above(wi, wo) && p > T(0), wi, eval(wi, wo) * (wi.z / maximum(p, tiny<T>())), p);
   }
 
-  /// GGX facets and the matte part. The facets are those of form(); their weight is that of the curves over those of
-  /// Cycles' facets, which have d = F = 1 and Smith's correlated shadowing, at a frequent slope and where the lobe is at
-  /// its mean height.
+  /// GGX facets and the matte part. The facets' weight is that of the curves over those of Cycles' facets, which have
+  /// d = F = 1 and Smith's correlated shadowing, at a frequent slope and where the lobe is at its mean height. They fade
+  /// where the lobe is not one of facets: stretched as form() is, they lacked half of fitted lobes about the mirror
+  /// direction.
   ClosureSum<T> base(const Vec3<T>& wo) const {
-    const Form m = form(wo);
-    const T zo = maximum(wo.z, T(0)), det = sqr(m.root);
-    // The axes of the form: the tangent is the one with the larger coefficient, the narrow one.
-    const T mean = (m.xx + m.yy) / T(2), difference = (m.xx - m.yy) / T(2);
-    const T spread = named("spread", sqrt(sqr(difference) + sqr(m.xy))), steep = mean + spread;
-    const T cos2 = select(spread > T(1e-6) * mean, difference / maximum(spread, tiny<T>()), T(1));
-    const T side = select(m.xy < T(0), T(-1), T(1));
-    const T narrow = facet_alpha(T(1) / sqrt(steep)), wide = facet_alpha(sqrt(steep) / m.root);
-    const T p2 = minimum((m.yy * sqr(wo.x) - T(2) * m.xy * wo.x * wo.y + m.xx * sqr(wo.y)) / det, T(1));
+    const T zo = maximum(wo.z, T(0)), p2 = sqr(ax * wo.x) + sqr(ay * wo.y);
+    const T facets_share = named("facets_share", clamp01(T(1) - T(2) * abs(T(1) - about)));
     const T zi = lobe_height(zo, T(0.7) * p2);
     // (n.w) Lambda.
     const auto hidden = [&](const T& z) { return p2 / (T(2) * maximum(sqrt(z * z + p2) + z, tiny<T>())); };
     const T inverse_smith = zi * zo + zo * hidden(zi) + zi * hidden(zo);
     const Rgb<T> weight = product(T(kLn2), T(1) - zi, log_visibility(zi) + log_visibility(zo)) *
-                          (T(0.92) * inverse_smith / (least_height(zi) * least_height(zo)) * (narrow * wide / (ax * ay)));
-    Closure<T> lobe(ClosureKind::Ggx, weight);
-    lobe.alpha = narrow;
-    lobe.alpha_across = wide;
-    lobe.tangent = {sqrt(maximum((T(1) + cos2) / T(2), T(0))), side * sqrt(maximum((T(1) - cos2) / T(2), T(0))), T(0)};
-    lobe.stretched = Tangent::Surface;
-    return {lobe, Closure<T>(ClosureKind::Diffuse, rho * (matte_at(zo) * (T(1) - rim / T(6))))};
+                          (T(0.92) * inverse_smith / (least_height(zi) * least_height(zo)) * facets_share);
+    Closure<T> matte(ClosureKind::Diffuse, rho * (matte_at(zo) * (T(1) - rim / T(6))));
+    return {facets(ClosureKind::Ggx, weight, ax, ay, T(0)), matte};
   }
 };
 
