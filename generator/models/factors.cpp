@@ -43,8 +43,8 @@
 //
 // f is reciprocal. Like measured data, it may reflect more light than arrives.
 //
-// Sampling: a matte direction or a half vector. The pdf of ln q, as of D with the largest d of the channels, consists
-// of exponentials, whose integrals are inverted in closed form. Half vectors are sampled as if q - 1 were the quadratic
+// Sampling: a matte direction or a half vector. The pdf of ln q, nearly as of D with the largest d of the channels,
+// consists of exponentials, whose integrals are inverted in closed form: fewer than D has, for shorter shaders. Half vectors are sampled as if q - 1 were the quadratic
 // form of the slopes that it is where the slopes are small, for k = 1 everywhere. Elsewhere their pdf may be far too
 // small, so some directions are matte ones in any case.
 #include "model/base_terms.h"
@@ -59,6 +59,14 @@ constexpr std::array<double, 14> kD = {0, 0.3, 0.6, 0.9, 1.25, 1.65, 2.1, 2.6, 3
 constexpr std::array<double, 7> kF = {0, 0.05, 0.2, 0.4, 0.6, 0.8, 1};
 // Knots of G in -log2 cos theta. G = 1 at the first.
 constexpr std::array<double, 5> kG = {0, 1, 2, 3, 4};
+
+// Of the knots of d, those of the curve that slopes are sampled by.
+constexpr std::array<std::size_t, 8> kSampled = {0, 1, 3, 5, 7, 9, 11, 13};
+constexpr std::array<double, kSampled.size()> kX = [] {
+  std::array<double, kSampled.size()> out{};
+  for (std::size_t k = 0; k < out.size(); ++k) out[k] = kD[kSampled[k]];
+  return out;
+}();
 
 constexpr double kLn2 = 0.69314718055994530942;
 
@@ -198,10 +206,11 @@ template <class T> struct Factors {
     return select(above(wi, wo), matte + product(log1p(m.s2), m.one_minus_oh, visible) * scale, Rgb<T>(T(0)));
   }
 
-  /// The pdf of x = ln q: the exponential of a curve, e^(E(x)), divided by its integral. E = ln d - x.
+  /// The pdf of x = ln q: the exponential of a curve, e^(E(x)), divided by its integral. E = ln d - x, where d is the
+  /// lowest curve over kX of which no knot of any channel is above.
   struct Slant {
-    std::array<T, kD.size()> log_d;
-    std::array<T, kD.size()> before;  ///< the integral up to each knot
+    std::array<T, kX.size()> log_d;
+    std::array<T, kX.size()> before;  ///< the integral up to each knot
     T total;
   };
   /// (e^t - 1) / t.
@@ -210,19 +219,26 @@ template <class T> struct Factors {
     return select(small, T(1) + t / T(2), expm1(t) / select(small, T(1), t));
   }
   /// The change of E over a piece, and its integral.
-  static T rise(const std::array<T, kD.size()>& log_d, std::size_t k) {
-    return log_d[k + 1] - log_d[k] - T(kD[k + 1] - kD[k]);
+  static T rise(const std::array<T, kX.size()>& log_d, std::size_t k) {
+    return log_d[k + 1] - log_d[k] - T(kX[k + 1] - kX[k]);
   }
   Slant slant() const {
     Slant out;
-    for (std::size_t k = 0; k < kD.size(); ++k) out.log_d[k] = log(max_component(d[k]) + tiny<T>());
-    T sum(0);
-    for (std::size_t k = 0; k + 1 < kD.size(); ++k) {
-      out.before[k] = sum;
-      sum = sum + exp(out.log_d[k] - T(kD[k])) * T(kD[k + 1] - kD[k]) * expm1_over(rise(out.log_d, k));
+    for (std::size_t k = 0; k < kX.size(); ++k) {
+      // The knots between those beside it.
+      const std::size_t first = k == 0 ? 0 : kSampled[k - 1] + 1;
+      const std::size_t end = k + 1 == kX.size() ? kD.size() : kSampled[k + 1];
+      T highest = max_component(d[first]);
+      for (std::size_t i = first + 1; i < end; ++i) highest = maximum(highest, max_component(d[i]));
+      out.log_d[k] = log(highest + tiny<T>());
     }
-    out.before[kD.size() - 1] = sum;
-    out.total = sum + exp(out.log_d[kD.size() - 1] - T(kD[kD.size() - 1]));
+    T sum(0);
+    for (std::size_t k = 0; k + 1 < kX.size(); ++k) {
+      out.before[k] = sum;
+      sum = sum + exp(out.log_d[k] - T(kX[k])) * T(kX[k + 1] - kX[k]) * expm1_over(rise(out.log_d, k));
+    }
+    out.before[kX.size() - 1] = sum;
+    out.total = sum + exp(out.log_d[kX.size() - 1] - T(kX[kX.size() - 1]));
     return out;
   }
 
@@ -262,7 +278,7 @@ template <class T> struct Factors {
     const T s2 = named("form_s2", maximum(form.xx * sqr(s.x) + T(2) * form.xy * s.x * s.y + form.yy * sqr(s.y), T(0)));
     const T q = T(1) + s2, inverse_cos2 = s.inverse_cos2();
     // x = ln q has the pdf e^E / total, and dx = d(s^2) / q, where pi d(s^2) / root is the area of slopes.
-    const T pdf_x = exp(curve(slant.log_d, passed(kD, log1p(s2)))) / slant.total;
+    const T pdf_x = exp(curve(slant.log_d, passed(kX, log1p(s2)))) / slant.total;
     return pdf_x * (sqrt(inverse_cos2) * form.root / q) * (inverse_cos2 / q) /
            (T(4) * pi<T>() * maximum(half.oh, tiny<T>()));
   }
@@ -282,20 +298,20 @@ template <class T> struct Factors {
     const auto even = u.x < share + even_share();
     // In the last piece that begins below it: the integral from its first knot is `rest`.
     const T target = u.y * s.total;
-    const std::size_t last = kD.size() - 1;
+    const std::size_t last = kX.size() - 1;
     T x(0);
     for (std::size_t k = 0; k < last; ++k) {
-      const T r = rise(s.log_d, k), width(kD[k + 1] - kD[k]);
-      const T height = exp(s.log_d[k] - T(kD[k])) * width;
+      const T r = rise(s.log_d, k), width(kX[k + 1] - kX[k]);
+      const T height = exp(s.log_d[k] - T(kX[k])) * width;
       const T rest = maximum(target - s.before[k], T(0)) / maximum(height, tiny<T>());
       const auto flat = abs(r) < T(1e-4);
       const T curved = log1p(maximum(rest * r, T(-1) + T(1e-7))) / select(flat, T(1), r);
       const T part = clamp01(select(flat, rest, curved));
-      x = select(target >= s.before[k], T(kD[k]) + width * part, x);
+      x = select(target >= s.before[k], T(kX[k]) + width * part, x);
     }
     // Beyond the last knot, e^(E) falls as e^(-x).
     const T above_it = maximum((s.total - target) / maximum(s.total - s.before[last], tiny<T>()), T(1e-12));
-    x = named("x", select(target >= s.before[last], T(kD[last]) - log(minimum(above_it, T(1))), x));
+    x = named("x", select(target >= s.before[last], T(kX[last]) - log(minimum(above_it, T(1))), x));
     // Slopes on the ellipse where the form is `slope` squared.
     const T slope = sqrt(expm1(x)), phi = T(2) * pi<T>() * u.z, root_yy = sqrt(m.yy);
     const T along = slope * cos(phi) / m.root;

@@ -1431,13 +1431,18 @@ def factors_pdf(p, wi, wo):
     """The pdf of ln q is a product of powers of q, which are integrated one after another."""
     ki, ko, h, oh = half(wi, wo)
     largest = [mp.mpf(max(p[f"d{k}"])) for k in range(14)]
+    # A knot of the sampled curve is as high as those next to it that are left out.
+    kept = (0, 1, 3, 5, 7, 9, 11, 13)
+    knots = [D_KNOTS[k] for k in kept]
+    beside = [[i for i in (k - 1, k, k + 1) if i == k or i in range(14) and i not in kept] for k in kept]
+    largest = [max(largest[i] for i in near) for near in beside]
 
     def density(x):
-        return mp.exp(log_curve(D_KNOTS, largest, x, mp.log) - x)
+        return mp.exp(log_curve(knots, largest, x, mp.log) - x)
 
-    ends = [density(mp.mpf(x)) for x in D_KNOTS]
+    ends = [density(mp.mpf(x)) for x in knots]
     total = ends[-1]
-    for x, y, left, right in zip(D_KNOTS, D_KNOTS[1:], ends, ends[1:], strict=False):
+    for x, y, left, right in zip(knots, knots[1:], ends, ends[1:], strict=False):
         power = mp.log(right / left)
         total += (y - x) * (left if power == 0 else (right - left) / power)
     mirrored = max(
