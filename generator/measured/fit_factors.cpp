@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "core/parallel.h"
 #include "fit/view.h"
@@ -24,7 +25,7 @@ constexpr std::array<double, 4> kShapes = {1, 0, -1, 2};
 constexpr double kBesideShape = 0.1, kAsGood = 1.01;
 /// Roughnesses that are tried: of one, of one with the other shapes, and of each of two.
 constexpr int kPlaces = 17, kPlacesOfOthers = 9, kPlacesEach = 7;
-constexpr std::size_t kStarts = 3;            ///< searches begin at the best of them
+constexpr std::size_t kStarts = 3;  ///< searches begin at the best of them
 constexpr double kSmoothest = 0.003, kRoughest = 1;
 constexpr int kFewSteps = 12, kSteps = 60;  ///< of the search for heights
 /// Heights of colours are searched between the exponentials of these: wider than single precision tells from 0
@@ -444,30 +445,29 @@ ModelFit fit_factors(const Model& model, const CurveRoles& roles, bool isotropic
   for (Try& t : tries) {
     std::vector<fit::Variable> variables;
     for (const double x : t.t) variables.push_back({x, 0, 1, isotropic ? 0.03 : 0.08});
-    t.t = fit::argmin(variables, [&](const std::vector<double>& x) {
-      return std::min(error(x, of_coarse, coarse), 1e6);
-    });
+    t.t = fit::argmin(variables,
+                      [&](const std::vector<double>& x) { return std::min(error(x, of_coarse, coarse), 1e6); });
     t.error = error(t.t, of_fine, fine);
   }
-  Try nearest = *std::ranges::min_element(tries, {}, &Try::error);
+  std::vector<double> best = std::ranges::min_element(tries, {}, &Try::error)->t;
+  auto heights = std::make_unique<Heights>(curves, lobe(best), of_fine, fine);
+  heights->solve(kSteps);
   // A shape that has a name is better than one beside it.
-  const double shape = lobe(nearest.t).shape, named = std::round(shape);
+  const double shape = lobe(best).shape, named = std::round(shape);
   if (std::abs(shape - named) < kBesideShape) {
-    Try to = nearest;
-    to.t[0] = (named - first) / range;
-    to.error = error(to.t, of_fine, fine);
-    if (to.error < kAsGood * nearest.error) nearest = to;
+    std::vector<double> to = best;
+    to[0] = (named - first) / range;
+    auto with_name = std::make_unique<Heights>(curves, lobe(to), of_fine, fine);
+    with_name->solve(kSteps);
+    if (with_name->error() < kAsGood * heights->error()) best = to, heights = std::move(with_name);
   }
-  const std::vector<double>& best = nearest.t;
-  Heights heights(curves, lobe(best), of_fine, fine);
-  heights.solve(kSteps);
   const auto found = [&](const ParamValues& values) {
     const auto brdf = model.make_double(values);
     Colors f(last.wi.size());
     for (std::size_t k = 0; k < f.size(); ++k) f[k] = brdf->eval(last.wi[k], last.wo[k]);
     return error_of(last, f);
   };
-  out.values = curves.values(lobe(best), heights.logs(), heights.matte(), heights.rim());
+  out.values = curves.values(lobe(best), heights->logs(), heights->matte(), heights->rim());
   out.error = found(out.values);
   // A peak between the directions of a table may be met by none of the pairs that the curves were found with.
   const ParamValues matte = curves.matte_alone(last);

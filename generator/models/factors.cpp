@@ -44,9 +44,9 @@
 // f is reciprocal. Like measured data, it may reflect more light than arrives.
 //
 // Sampling: a matte direction or a half vector. The pdf of ln q, nearly as of D with the largest d of the channels,
-// consists of exponentials, whose integrals are inverted in closed form: fewer than D has, for shorter shaders. Half vectors are sampled as if q - 1 were the quadratic
-// form of the slopes that it is where the slopes are small, for k = 1 everywhere. Elsewhere their pdf may be far too
-// small, so some directions are matte ones in any case.
+// consists of exponentials, whose integrals are inverted in closed form: fewer than D has, for shorter shaders. Half
+// vectors are sampled as if q - 1 were the quadratic form of the slopes that it is where the slopes are small, for k =
+// 1 everywhere. Elsewhere their pdf may be far too small, so some directions are matte ones in any case.
 #include "model/base_terms.h"
 #include "model/half_vector.h"
 
@@ -117,9 +117,10 @@ template <class T> struct Factors {
     v(ax, NumberSpec{"ax", "Roughness X", 0.2, 1e-4, 1, 0.02, 0.5, "Unit of the slope along the tangent"}.by_factors());
     v(ay,
       NumberSpec{"ay", "Roughness Y", 0.2, 1e-4, 1, 0.02, 0.5, "Unit of the slope across the tangent"}.by_factors());
-    v(about, NumberSpec{"about", "Lobe Shape", 1, -1, 2, -1, 2,
-                        "1: a lobe of facets; 0: about the mirror direction; -1: of equal heights; 2: narrows at grazing "
-                        "angles"});
+    v(about,
+      NumberSpec{"about", "Lobe Shape", 1, -1, 2, -1, 2,
+                 "1: a lobe of facets; 0: about the mirror direction; -1: of equal heights; 2: narrows at grazing "
+                 "angles"});
     static constexpr const char* kNames[] = {"d0", "d1", "d2", "d3",  "d4",  "d5",  "d6",
                                              "d7", "d8", "d9", "d10", "d11", "d12", "d13"};
     static constexpr const char* kLabels[] = {"Facets 0",  "Facets 1",  "Facets 2",  "Facets 3", "Facets 4",
@@ -250,7 +251,8 @@ template <class T> struct Factors {
     T xx, xy, yy, root;
   };
   Form form(const Vec3<T>& wo) const {
-    const T z2 = sqr(maximum(wo.z, T(0))) + T(4) * (sqr(ax * wo.x) + sqr(ay * wo.y)) + T(1e-8), sides = sqr(wo.x) + sqr(wo.y);
+    const T z2 = sqr(maximum(wo.z, T(0))) + T(4) * (sqr(ax * wo.x) + sqr(ay * wo.y)) + T(1e-8),
+            sides = sqr(wo.x) + sqr(wo.y);
     const T n = named("narrowing", narrowing(z2)), w = of_slope(), h = of_heights();
     const T level = T(0.3) * h * z2 / (z2 + sides), of_view = n * h / (z2 * ax * ay);
     const T x = n * w / sqr(ax) + level, y = n * w / sqr(ay) + level;
@@ -263,8 +265,8 @@ template <class T> struct Factors {
   T highlight_share(const Vec3<T>& wo, const Slant& slant, const Form& form) const {
     const T z = maximum(wo.z, T(0));
     const Rgb<T> log_f = curve(logs(f), passed(kF, T(1) - z));
-    const T highlight = slant.total * max_component(exp(log_f + Rgb<T>(log(strength + tiny<T>())))) /
-                        (ax * ay * form.root);
+    const T highlight =
+        slant.total * max_component(exp(log_f + Rgb<T>(log(strength + tiny<T>())))) / (ax * ay * form.root);
     const T matte = max_component(rho) * matte_at(z);
     return named("highlight_share", (T(1) - even_share()) * highlight / maximum(highlight + matte, tiny<T>()));
   }
@@ -327,9 +329,9 @@ template <class T> struct Factors {
   }
 
   /// GGX facets and the matte part. The facets' weight is that of the curves over those of Cycles' facets, which have
-  /// d = F = 1 and Smith's correlated shadowing, at a frequent slope and where the lobe is at its mean height. They fade
-  /// where the lobe is not one of facets: stretched as form() is, they lacked half of fitted lobes about the mirror
-  /// direction.
+  /// d = F = 1 and Smith's correlated shadowing, at a frequent slope and where the lobe is at its mean height. They
+  /// fade where the lobe is not one of facets: stretched as form() is, they lacked half of fitted lobes about the
+  /// mirror direction.
   ClosureSum<T> base(const Vec3<T>& wo) const {
     const T zo = maximum(wo.z, T(0)), p2 = sqr(ax * wo.x) + sqr(ay * wo.y);
     const T facets_share = named("facets_share", clamp01(T(1) - T(2) * abs(T(1) - about)));

@@ -1434,7 +1434,9 @@ def factors_pdf(p, wi, wo):
     # A knot of the sampled curve is as high as those next to it that are left out.
     kept = (0, 1, 3, 5, 7, 9, 11, 13)
     knots = [D_KNOTS[k] for k in kept]
-    beside = [[i for i in (k - 1, k, k + 1) if i == k or i in range(14) and i not in kept] for k in kept]
+    beside = [
+        [i for i in (k - 1, k, k + 1) if i == k or i in range(14) and i not in kept] for k in kept
+    ]
     largest = [max(largest[i] for i in near) for near in beside]
 
     def density(x):
@@ -2425,7 +2427,14 @@ MODELS = {
         f=factors_f,
         pdf=factors_pdf,
         albedo=factors_albedo,
-        defaults={"rho": (0.1, 0.03, 0.02), "rim": 0, "strength": 1, "ax": 0.2, "ay": 0.2, "about": 1}
+        defaults={
+            "rho": (0.1, 0.03, 0.02),
+            "rim": 0,
+            "strength": 1,
+            "ax": 0.2,
+            "ay": 0.2,
+            "about": 1,
+        }
         | {f"d{k}": (1, 1, 1) for k in range(14)}
         | {f"f{k}": (0.05 + 0.95 * x**5,) * 3 for k, x in enumerate(F_KNOTS)}
         | dict(zip(("g1", "g2", "g3", "g4"), (0.97, 0.88, 0.7, 0.45), strict=True)),
