@@ -83,7 +83,7 @@ TEST(FitFactors, BrushedMetal) {
   EXPECT_NEAR(std::get<double>(fit.values.at("ay")) / std::get<double>(fit.values.at("ax")), 0.33 / 0.08, 0.3);
 }
 
-/// Lobes that are not about the half vector. Bounds are 25 % above the measured errors.
+/// Lobes that are not about the half vector.
 TEST(FitFactors, LobesOfOtherShapes) {
   struct Row {
     Part made;
