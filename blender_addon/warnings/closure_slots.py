@@ -47,10 +47,10 @@ _STACK = 255
 #: is computed from it. With GLOG_v=3 in its environment, Blender prints the sum. 22 models were
 #: measured to take at most 192 under four area lamps and 243 under eight, `factors` 234 and 247.
 #: With all sockets linked, `radziszewski_alda` takes 253 under eight, and `factors`, which has 22
-#: colours, 242 under one. `microfacet`, whose base has Metallic nodes with sockets of their own,
+#: colours, 235 under one. `microfacet`, whose base has Metallic nodes with sockets of their own,
 #: takes 239 under two, and with linked sockets _METALS more are counted. `thin_film`, whose formula
 #: keeps most, has room for five lamps, or three if all of its sockets are linked.
-_OF_MATERIAL, _LINKED, _METALS = 85, 1.2, 45
+_OF_MATERIAL, _LINKED, _METALS = 85, 1.27, 45
 #: How many lamps there is room for beside several models as Formula Nodes. Cycles computes what
 #: their parts have in common first, for all lamps, and keeps it. Two models were measured to take
 #: 201 under four area lamps (233 if one is `factors`), three 185 under three, four and five 179

@@ -2,9 +2,11 @@
 #include "measured/fit_factors.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "core/parallel.h"
 #include "fit/view.h"
@@ -17,8 +19,13 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kPlaces = 17, kPlacesEach = 7;  ///< roughnesses that are tried: of one, and of each of two
-constexpr std::size_t kStarts = 3;            ///< searches begin at the best of them
+/// Shapes that are tried first: of facets, about the mirror direction, of equal heights, narrow at grazing angles.
+constexpr std::array<double, 4> kShapes = {1, 0, -1, 2};
+/// A shape as near to one of them becomes that one, if the error is at most so many times as large.
+constexpr double kBesideShape = 0.1, kAsGood = 1.01;
+/// Roughnesses that are tried: of one, of one with the other shapes, and of each of two.
+constexpr int kPlaces = 17, kPlacesOfOthers = 9, kPlacesEach = 7;
+constexpr std::size_t kStarts = 3;  ///< searches begin at the best of them
 constexpr double kSmoothest = 0.003, kRoughest = 1;
 constexpr int kFewSteps = 12, kSteps = 60;  ///< of the search for heights
 /// Heights of colours are searched between the exponentials of these: wider than single precision tells from 0
@@ -29,7 +36,19 @@ constexpr double kFirstFloor = 0.3, kLastFloor = 3e-3;
 /// Where the data say nothing, curves go on straight in the logarithm, and become flat.
 constexpr double kStiffness = 1e-4, kFlatness = 1e-6;
 
-/// The highlight's powers and the rest of it, for pairs of directions and roughnesses.
+/// What the highlight's first curve is a function of.
+struct CurveLobe {
+  std::vector<double> roughness;
+  double shape;
+};
+
+/// What pairs of directions determine, for any lobe.
+struct Fixed {
+  MatrixXd power;  ///< of the heights beyond the first curve, a row for each pair
+  MatrixXd matte;  ///< of a white surface: coefficients of 1, the rim and its square
+};
+
+/// The highlight's powers and the rest of it, for pairs of directions and a lobe.
 struct Powers {
   VectorXd unit;   ///< f with all heights and the strength 1, and without matte light
   MatrixXd power;  ///< of each height, a row for each pair
@@ -40,36 +59,47 @@ class Curves {
   Curves(const Model& model, const CurveRoles& roles)
       : model_(model), roles_(roles), values_(complete(model.info(), {})) {
     set(*roles_.matte, 0);
+    set(*roles_.rim, 0);
     set(*roles_.strength, 1);
     for (const auto* heights : {&roles_.colors, &roles_.numbers})
       for (const ParamInfo* p : *heights) set(*p, 1);
   }
 
-  Powers powers(const std::vector<double>& roughness, const Pairs& pairs) const {
-    ParamValues values = values_;
-    for (std::size_t i = 0; i < roughness.size(); ++i) values[roles_.roughness[i]->name] = roughness[i];
-    const auto brdf = model_.make_double(values);
-    const Index count = Index(pairs.wi.size());
-    Powers out{f(*brdf, pairs), MatrixXd(count, heights())};
-    Index column = 0;
-    for (const auto* heights : {&roles_.colors, &roles_.numbers})
-      for (const ParamInfo* p : *heights) {
-        constexpr double kLess = 0.5;
-        brdf->assign(p->name, {kLess, kLess, kLess});
-        out.power.col(column++) = ((f(*brdf, pairs).array() / out.unit.array()).log() / std::log(kLess)).matrix();
-        brdf->assign(p->name, {1, 1, 1});
-      }
+  Fixed fixed(const Pairs& pairs) const {
+    const Index count = Index(pairs.wi.size()), first = in_lobe();
+    Fixed out{MatrixXd(count, heights() - first), MatrixXd(count, 3)};
+    const auto brdf = model_.make_double(values_);
+    const VectorXd unit = f(*brdf, pairs);
+    for (Index k = first; k < heights(); ++k) out.power.col(k - first) = power(*brdf, pairs, unit, k);
+    brdf->assign(roles_.strength->name, {0, 0, 0});
+    brdf->assign(roles_.matte->name, {1, 1, 1});
+    const auto at = [&](double rim) {
+      brdf->assign(roles_.rim->name, {rim, rim, rim});
+      return f(*brdf, pairs);
+    };
+    const VectorXd none = at(0), half = at(0.5), whole = at(1);
+    out.matte << none, 4 * half - 3 * none - whole, 2 * (whole + none) - 4 * half;
+    return out;
+  }
+  Powers powers(const CurveLobe& lobe, const Fixed& fixed, const Pairs& pairs) const {
+    const auto brdf = model_.make_double(at(lobe));
+    Powers out{f(*brdf, pairs), MatrixXd(Index(pairs.wi.size()), heights())};
+    const Index first = in_lobe();
+    for (Index k = 0; k < first; ++k) out.power.col(k) = power(*brdf, pairs, out.unit, k);
+    out.power.rightCols(heights() - first) = fixed.power;
     return out;
   }
   Index heights() const { return Index(roles_.colors.size() + roles_.numbers.size()); }
   Index own() const { return Index(roles_.colors.size()); }
+  /// How many heights are of the first curve.
+  Index in_lobe() const { return curves().front().second; }
 
   /// Heights of 1 at most, the rest of them in the strength, and the colour in the second curve: a factor of one curve
   /// and its inverse of the other leave f as it is. `logs`: of the heights, a column for each channel.
-  ParamValues values(const std::vector<double>& roughness, MatrixXd logs, const Rgb<double>& matte) const {
-    ParamValues out = values_;
-    for (std::size_t i = 0; i < roughness.size(); ++i) out[roles_.roughness[i]->name] = roughness[i];
+  ParamValues values(const CurveLobe& lobe, MatrixXd logs, const Rgb<double>& matte, double rim) const {
+    ParamValues out = at(lobe);
     out[roles_.matte->name] = std::array<double, 3>{matte.r, matte.g, matte.b};
+    out[roles_.rim->name] = rim;
     const auto of_colors = curves();
     const auto [first_row, first_end] = of_colors[0];
     Index brightest;
@@ -123,6 +153,20 @@ class Curves {
   }
 
  private:
+  ParamValues at(const CurveLobe& lobe) const {
+    ParamValues out = values_;
+    for (std::size_t i = 0; i < lobe.roughness.size(); ++i) out[roles_.roughness[i]->name] = lobe.roughness[i];
+    out[roles_.shape->name] = lobe.shape;
+    return out;
+  }
+  VectorXd power(Brdf<double>& brdf, const Pairs& pairs, const VectorXd& unit, Index k) const {
+    const ParamInfo& p = k < own() ? *roles_.colors[std::size_t(k)] : *roles_.numbers[std::size_t(k - own())];
+    constexpr double kLess = 0.5;
+    brdf.assign(p.name, {kLess, kLess, kLess});
+    const VectorXd out = ((f(brdf, pairs).array() / unit.array()).log() / std::log(kLess)).matrix();
+    brdf.assign(p.name, {1, 1, 1});
+    return out;
+  }
   static VectorXd f(const Brdf<double>& brdf, const Pairs& pairs) {
     VectorXd out(Index(pairs.wi.size()));
     for (std::size_t k = 0; k < pairs.wi.size(); ++k) out[Index(k)] = brdf.eval(pairs.wi[k], pairs.wo[k]).g;
@@ -140,12 +184,12 @@ class Curves {
   ParamValues values_;
 };
 
-/// Heights and matte light for given roughnesses. Unknowns: for each channel matte light and the logarithms of its
-/// heights, then those of the heights that all three share.
+/// Heights and matte light for a given lobe. Unknowns: for each channel matte light and the logarithms of its heights,
+/// then those of the heights that all three share, and the matte light's rim.
 class Heights {
  public:
-  Heights(const Curves& curves, const std::vector<double>& roughness, const Pairs& pairs)
-      : curves_(curves), pairs_(pairs), p_(curves.powers(roughness, pairs)), own_(curves.own() + 1) {
+  Heights(const Curves& curves, const CurveLobe& lobe, const Fixed& fixed, const Pairs& pairs)
+      : curves_(curves), fixed_(fixed), pairs_(pairs), p_(curves.powers(lobe, fixed, pairs)), own_(curves.own() + 1) {
     const Index count = p_.power.rows();
     for (Index k = 0; k < count; ++k) {
       std::vector<Index> used;
@@ -176,6 +220,7 @@ class Heights {
   double error() const { return error_; }
 
   Rgb<double> matte() const { return {x_[0], x_[own_], x_[2 * own_]}; }
+  double rim() const { return x_[x_.size() - 1]; }
   MatrixXd logs() const {
     MatrixXd out(p_.power.cols(), 3);
     for (Index c = 0; c < 3; ++c)
@@ -184,7 +229,7 @@ class Heights {
   }
 
  private:
-  Index unknowns() const { return 3 * own_ + p_.power.cols() - (own_ - 1); }
+  Index unknowns() const { return 3 * own_ + p_.power.cols() - (own_ - 1) + 1; }
   /// Where the height j of channel c stands among the unknowns.
   Index place(Index j, Index c) const { return j < own_ - 1 ? c * own_ + 1 + j : 3 * own_ + j - (own_ - 1); }
 
@@ -193,12 +238,20 @@ class Heights {
     for (const Index j : used_[k]) sum += p_.power(Index(k), j) * x[place(j, c)];
     return p_.unit[Index(k)] * std::exp(sum);
   }
+  /// The matte light of a white surface, and its slope by the rim.
+  std::pair<double, double> white(const VectorXd& x, std::size_t k) const {
+    const auto m = fixed_.matte.row(Index(k));
+    const double rim = x[x.size() - 1];
+    return {m[0] + rim * (m[1] + rim * m[2]), m[1] + 2 * rim * m[2]};
+  }
   double error(const VectorXd& x) const {
     double off = 0;
-    for (std::size_t k = 0; k < used_.size(); ++k)
+    for (std::size_t k = 0; k < used_.size(); ++k) {
+      const double matte = white(x, k).first;
       for (Index c = 0; c < 3; ++c)
         off += pairs_.weight[Index(k)] *
-               std::abs(x[c * own_] / kPi + highlight(x, k, c) - channel(pairs_.data[k], std::size_t(c)));
+               std::abs(x[c * own_] * matte + highlight(x, k, c) - channel(pairs_.data[k], std::size_t(c)));
+    }
     return off / pairs_.light;
   }
 
@@ -228,7 +281,7 @@ class Heights {
   void keep_in_range(VectorXd& x) const {
     for (Index i = 0; i < x.size(); ++i) {
       const bool is_matte = i < 3 * own_ && i % own_ == 0, is_shared = i >= 3 * own_;
-      if (is_matte)
+      if (is_matte || i + 1 == x.size())
         x[i] = std::clamp(x[i], 0., 1.);
       else
         x[i] = std::clamp(x[i], is_shared ? -kSharedRange : -kRange, is_shared ? 0. : kRange);
@@ -263,6 +316,7 @@ class Heights {
     const VectorXd found = a.ldlt().solve(b);
     for (Index i = 0; i < x.size(); ++i)
       if (!(i < 3 * own_ && i % own_ == 0)) x[i] = found[i];
+    x[x.size() - 1] = 0;
     keep_in_range(x);
     return x;
   }
@@ -278,9 +332,10 @@ class Heights {
       for (std::size_t k = 0; k < used_.size(); ++k)
         for (Index c = 0; c < 3; ++c) {
           const double high = highlight(x, k, c);
-          const double r = x[c * own_] / kPi + high - channel(pairs_.data[k], std::size_t(c));
+          const auto [matte, by_rim] = white(x, k);
+          const double r = x[c * own_] * matte + high - channel(pairs_.data[k], std::size_t(c));
           const double w = pairs_.weight[Index(k)] / (pairs_.light * std::max(std::abs(r), floor));
-          slope.assign(1, {c * own_, 1 / kPi});
+          slope.assign({{c * own_, matte}, {x.size() - 1, x[c * own_] * by_rim}});
           for (const Index j : used_[k]) slope.emplace_back(place(j, c), high * p_.power(Index(k), j));
           for (const auto& [i, u] : slope) {
             b[i] -= w * u * r;
@@ -288,6 +343,8 @@ class Heights {
           }
         }
       add_stiffness(a, b, x, kStiffness, kFlatness);
+      const Index rim = x.size() - 1;
+      a(rim, rim) += kFlatness, b[rim] -= kFlatness * x[rim];
       bool better = false;
       for (int tries = 0; tries < 6 && !better; ++tries) {
         MatrixXd damped = a;
@@ -308,6 +365,7 @@ class Heights {
   }
 
   const Curves& curves_;
+  const Fixed& fixed_;
   const Pairs& pairs_;
   Powers p_;
   Index own_;  ///< unknowns of each channel
@@ -325,8 +383,12 @@ std::optional<CurveRoles> curve_roles(const Model& model) {
   for (const ParamInfo& p : model.info().params) {
     if (p.name == "rho")
       out.matte = &p;
+    else if (p.name == "rim")
+      out.rim = &p;
     else if (p.name == "strength")
       out.strength = &p;
+    else if (p.name == "about")
+      out.shape = &p;
     else if (p.name == "ax" || p.name == "ay")
       out.roughness.push_back(&p);
     else
@@ -341,51 +403,71 @@ ModelFit fit_factors(const Model& model, const CurveRoles& roles, bool isotropic
   const Curves curves(model, roles);
   ModelFit out;
   out.model = &model;
-  out.found = int(roles.colors.size() + roles.numbers.size()) + 2 + (isotropic ? 1 : 2);
+  out.found = int(roles.colors.size() + roles.numbers.size()) + 4 + (isotropic ? 1 : 2);
   if (!(fine.light > 0 && last.light > 0)) {
     out.values = curves.matte_alone(last);
     return out;
   }
-  const auto roughness = [&](const std::vector<double>& t) {
-    std::vector<double> out;
+  // Places: the shape, then the roughnesses.
+  const double first = roles.shape->min, range = roles.shape->max - roles.shape->min;
+  const auto lobe = [&](const std::vector<double>& t) {
+    CurveLobe out{{}, first + range * t[0]};
     for (std::size_t i = 0; i < roles.roughness.size(); ++i)
-      out.push_back(kSmoothest * std::pow(kRoughest / kSmoothest, t[isotropic ? 0 : i]));
+      out.roughness.push_back(kSmoothest * std::pow(kRoughest / kSmoothest, t[isotropic ? 1 : 1 + i]));
     return out;
   };
   struct Try {
     std::vector<double> t;
     double error = 0;
   };
-  std::vector<Try> tries;
-  if (isotropic)
-    for (int i = 0; i < kPlaces; ++i) tries.push_back({{i / (kPlaces - 1.)}});
-  else
-    for (int i = 0; i < kPlacesEach; ++i)
-      for (int j = 0; j < kPlacesEach; ++j) tries.push_back({{i / (kPlacesEach - 1.), j / (kPlacesEach - 1.)}});
-  const auto error = [&](const std::vector<double>& t, const Pairs& pairs) {
-    Heights heights(curves, roughness(t), pairs);
+  const Fixed of_coarse = curves.fixed(coarse), of_fine = curves.fixed(fine);
+  const auto error = [&](const std::vector<double>& t, const Fixed& fixed, const Pairs& pairs) {
+    Heights heights(curves, lobe(t), fixed, pairs);
     heights.solve(kFewSteps);
     return heights.error();
   };
-  for (Try& t : tries) t.error = error(t.t, coarse);
+  std::vector<Try> tries;
+  for (const double shape : kShapes) {
+    const double t = (shape - first) / range;
+    const int places = shape == kShapes[0] ? kPlaces : kPlacesOfOthers;
+    if (isotropic)
+      for (int i = 0; i < places; ++i) tries.push_back({{t, i / (places - 1.)}});
+    else
+      for (int i = 0; i < kPlacesEach; ++i)
+        for (int j = 0; j < kPlacesEach; ++j) {
+          if (shape != kShapes[0] && (i + j) % 2 != 0) continue;
+          tries.push_back({{t, i / (kPlacesEach - 1.), j / (kPlacesEach - 1.)}});
+        }
+  }
+  for (Try& t : tries) t.error = error(t.t, of_coarse, coarse);
   std::ranges::stable_sort(tries, {}, &Try::error);
   tries.resize(kStarts);
   for (Try& t : tries) {
     std::vector<fit::Variable> variables;
     for (const double x : t.t) variables.push_back({x, 0, 1, isotropic ? 0.03 : 0.08});
-    t.t = fit::argmin(variables, [&](const std::vector<double>& x) { return std::min(error(x, coarse), 1e6); });
-    t.error = error(t.t, fine);
+    t.t = fit::argmin(variables,
+                      [&](const std::vector<double>& x) { return std::min(error(x, of_coarse, coarse), 1e6); });
+    t.error = error(t.t, of_fine, fine);
   }
-  const std::vector<double> best = roughness(std::ranges::min_element(tries, {}, &Try::error)->t);
-  Heights heights(curves, best, fine);
-  heights.solve(kSteps);
+  std::vector<double> best = std::ranges::min_element(tries, {}, &Try::error)->t;
+  auto heights = std::make_unique<Heights>(curves, lobe(best), of_fine, fine);
+  heights->solve(kSteps);
+  // A shape that has a name is better than one beside it.
+  const double shape = lobe(best).shape, named = std::round(shape);
+  if (std::abs(shape - named) < kBesideShape) {
+    std::vector<double> to = best;
+    to[0] = (named - first) / range;
+    auto with_name = std::make_unique<Heights>(curves, lobe(to), of_fine, fine);
+    with_name->solve(kSteps);
+    if (with_name->error() < kAsGood * heights->error()) best = to, heights = std::move(with_name);
+  }
   const auto found = [&](const ParamValues& values) {
     const auto brdf = model.make_double(values);
     Colors f(last.wi.size());
     for (std::size_t k = 0; k < f.size(); ++k) f[k] = brdf->eval(last.wi[k], last.wo[k]);
     return error_of(last, f);
   };
-  out.values = curves.values(best, heights.logs(), heights.matte());
+  out.values = curves.values(lobe(best), heights->logs(), heights->matte(), heights->rim());
   out.error = found(out.values);
   // A peak between the directions of a table may be met by none of the pairs that the curves were found with.
   const ParamValues matte = curves.matte_alone(last);

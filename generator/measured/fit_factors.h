@@ -10,11 +10,13 @@
 
 namespace brdfc::measured {
 
-/// How parameters of a model make its f: rho / pi + strength * (a product of powers of the curves' heights), where the
-/// powers depend on the directions and on the roughnesses.
+/// How parameters of a model make its f: matte light + strength * (a product of powers of the curves' heights). The
+/// powers depend on the directions; those of the first curve and the rest also on the roughnesses and the shape.
 struct CurveRoles {
-  const ParamInfo* matte = nullptr;               ///< a colour
+  const ParamInfo* matte = nullptr;               ///< a colour; the matte light is in proportion to it
+  const ParamInfo* rim = nullptr;                 ///< a number: the matte light is a square function of it
   const ParamInfo* strength = nullptr;            ///< a number
+  const ParamInfo* shape = nullptr;               ///< a number: what the lobe is about
   std::vector<const ParamInfo*> roughness;        ///< numbers, along the tangent first
   std::vector<const ParamInfo*> colors, numbers;  ///< heights: of each channel, and of all three
 };

@@ -1384,50 +1384,94 @@ def factor_product(p, s2, oh, cosines, channel, maths, number):
     )
 
 
+def factor_lobe(p, slopes, heights, oh, number):
+    """q - 1, and the remaining factor of the highlight but 1 / (4 cos cos): `slopes` are those of
+    the half vector, `heights` the cosines to the normal."""
+    k, ax, ay = number(p["about"]), number(p["ax"]), number(p["ay"])
+    m, facing = (heights[0] + heights[1]) / 2, min(max(k, 0), 1)
+    w = (1 + min(k, 1)) / 2
+    sz = (heights[0] - heights[1]) / (2 * m)
+    along = (slopes[0] / ax) ** 2 + (slopes[1] / ay) ** 2
+    s2 = m ** (2 - 2 * k) * (w * along + (1 - w) * sz**2 / (ax * ay))
+    return s2, (oh / m) ** (4 * facing) / (number(math.pi if number is float else mp.pi) * ax * ay)
+
+
+def factors_matte(p, cosine, number):
+    return 1 - number(p["rim"]) * (1 - cosine) ** 2
+
+
 def factors_f(p, wi, wo):
     ki, ko, h, oh = half(wi, wo)
-    ax, ay = mp.mpf(p["ax"]), mp.mpf(p["ay"])
-    s2 = ((h[0] / ax) ** 2 + (h[1] / ay) ** 2) / h[2] ** 2
-    scale = 1 / (mp.pi * ax * ay * h[2] ** 4)
+    s2, scale = factor_lobe(p, (h[0] / h[2], h[1] / h[2]), (ki[2], ko[2]), oh, mp.mpf)
+    matte = factors_matte(p, ki[2], mp.mpf) * factors_matte(p, ko[2], mp.mpf) / mp.pi
     return [
-        mp.mpf(p["rho"][c]) / mp.pi
+        mp.mpf(p["rho"][c]) * matte
         + scale * factor_product(p, s2, oh, (ki[2], ko[2]), c, mp, mp.mpf)
         for c in range(3)
     ]
 
 
+def factors_form(p, ko):
+    """The quadratic form of slopes by which half vectors are sampled, a matrix."""
+    k, ax, ay = mp.mpf(p["about"]), mp.mpf(p["ax"]), mp.mpf(p["ay"])
+    slope, view = (1 + min(k, 1)) / 2, (1 - min(k, 1)) / 2
+    z2 = ko[2] ** 2 + 4 * ((ax * ko[0]) ** 2 + (ay * ko[1]) ** 2) + mp.mpf("1e-8")
+    level = mp.mpf("0.3") * view * z2 / (z2 + ko[0] ** 2 + ko[1] ** 2)
+    n = z2 ** (1 - k)
+    along = n * view / (z2 * ax * ay)
+    return mp.matrix(
+        [
+            [n * slope / ax**2 + level + along * ko[0] ** 2, along * ko[0] * ko[1]],
+            [along * ko[0] * ko[1], n * slope / ay**2 + level + along * ko[1] ** 2],
+        ]
+    )
+
+
 def factors_pdf(p, wi, wo):
     """The pdf of ln q is a product of powers of q, which are integrated one after another."""
     ki, ko, h, oh = half(wi, wo)
-    ax, ay = mp.mpf(p["ax"]), mp.mpf(p["ay"])
     largest = [mp.mpf(max(p[f"d{k}"])) for k in range(14)]
+    # A knot of the sampled curve is as high as those next to it that are left out.
+    kept = (0, 1, 3, 5, 7, 9, 11, 13)
+    knots = [D_KNOTS[k] for k in kept]
+    beside = [
+        [i for i in (k - 1, k, k + 1) if i == k or i in range(14) and i not in kept] for k in kept
+    ]
+    largest = [max(largest[i] for i in near) for near in beside]
 
     def density(x):
-        return mp.exp(log_curve(D_KNOTS, largest, x, mp.log) - x)
+        return mp.exp(log_curve(knots, largest, x, mp.log) - x)
 
-    ends = [density(mp.mpf(x)) for x in D_KNOTS]
+    ends = [density(mp.mpf(x)) for x in knots]
     total = ends[-1]
-    for x, y, left, right in zip(D_KNOTS, D_KNOTS[1:], ends, ends[1:], strict=False):
+    for x, y, left, right in zip(knots, knots[1:], ends, ends[1:], strict=False):
         power = mp.log(right / left)
         total += (y - x) * (left if power == 0 else (right - left) / power)
     mirrored = max(
         mp.exp(log_curve(F_KNOTS, factor_heights(p, "f", 7, c, mp.mpf), 1 - ko[2], mp.log))
         for c in range(3)
     )
-    highlight = p["strength"] * total * mirrored
-    share = highlight / (highlight + max(mp.mpf(c) for c in p["rho"]))
-    s2 = ((h[0] / ax) ** 2 + (h[1] / ay) ** 2) / h[2] ** 2
-    p_h = density(mp.log(1 + s2)) / total / (1 + s2) / (mp.pi * ax * ay * h[2] ** 3)
-    return share * p_h / (4 * oh) + (1 - share) * ki[2] / mp.pi
+    form = factors_form(p, ko)
+    root = mp.sqrt(mp.det(form))
+    highlight = p["strength"] * total * mirrored / (mp.mpf(p["ax"]) * mp.mpf(p["ay"]) * root)
+    matte = max(mp.mpf(c) for c in p["rho"]) * factors_matte(p, ko[2], mp.mpf)
+    k = mp.mpf(p["about"])
+    even = mp.mpf("0.2") * min(2 * abs(1 - k), 1) + mp.mpf("0.5") * max(min(-k, 1), 0)
+    share = (1 - even) * highlight / (highlight + matte)
+    slopes = mp.matrix([h[0] / h[2], h[1] / h[2]])
+    s2 = (slopes.T * form * slopes)[0]
+    p_h = density(mp.log(1 + s2)) / total / (1 + s2) * root / (mp.pi * h[2] ** 3)
+    others = even / (2 * mp.pi) + (1 - share - even) * ki[2] / mp.pi
+    return share * p_h / (4 * oh) + others
 
 
 def factors_albedo(p, cos_o):
     """With equal channels of all heights, and equal roughnesses."""
 
     def one(p, hn, oh, ni, no, phi):
-        t2 = (1 - hn**2) / hn**2
-        s2 = t2 * ((math.cos(phi) / p["ax"]) ** 2 + (math.sin(phi) / p["ay"]) ** 2)
-        scale = 1 / (math.pi * p["ax"] * p["ay"] * hn**4)
+        slope = math.sqrt(max(1 - hn**2, 0)) / hn
+        slopes = slope * math.cos(phi), slope * math.sin(phi)
+        s2, scale = factor_lobe(p, slopes, (ni, no), oh, float)
         return factor_product(p, s2, oh, (ni, no), 0, math, float) * scale * ni * 4 * oh
 
     def knots(p):
@@ -1435,7 +1479,8 @@ def factors_albedo(p, cos_o):
         return [math.atan(s) for s in slopes], [1 - x for x in F_KNOTS], [0.5**k for k in G_KNOTS]
 
     a = half_albedo(one, lambda p: min(p["ax"], p["ay"]), knots)(p, cos_o)
-    return [c + a for c in p["rho"]]
+    matte = factors_matte(p, cos_o, float) * (1 - p["rim"] / 6)
+    return [c * matte + a for c in p["rho"]]
 
 
 # ---- Schlick -----------------------------------------------------------------------------------
@@ -2382,7 +2427,14 @@ MODELS = {
         f=factors_f,
         pdf=factors_pdf,
         albedo=factors_albedo,
-        defaults={"rho": (0.1, 0.03, 0.02), "strength": 1, "ax": 0.2, "ay": 0.2}
+        defaults={
+            "rho": (0.1, 0.03, 0.02),
+            "rim": 0,
+            "strength": 1,
+            "ax": 0.2,
+            "ay": 0.2,
+            "about": 1,
+        }
         | {f"d{k}": (1, 1, 1) for k in range(14)}
         | {f"f{k}": (0.05 + 0.95 * x**5,) * 3 for k, x in enumerate(F_KNOTS)}
         | dict(zip(("g1", "g2", "g3", "g4"), (0.97, 0.88, 0.7, 0.45), strict=True)),
@@ -2398,10 +2450,15 @@ MODELS = {
             {"d0": (0.01, 0.01, 0.01), "d6": (0.3, 0.2, 0.1), "g1": 0.5, "g2": 1, "rho": (0, 0, 0)},
             {"ax": 1, "ay": 1, "strength": 1e3, "d13": (1e-6, 1e-3, 0)},
             {"ax": 1e-4, "ay": 1e-4},
+            {"about": 0, "ax": 0.05, "ay": 0.1, "d5": (0.5, 0.3, 0.1), "rim": 1},
+            {"about": -1, "rho": (0.3, 0.2, 0.1), "rim": 0.5},
+            {"about": 0.4, "ax": 0.4, "ay": 0.1, "d9": (0.1, 0.1, 0.1)},
+            {"about": 2, "ax": 0.3, "ay": 0.3, "d13": (1e-3, 1e-3, 1e-3)},
         ],
         albedo_cases=[
             {},
-            {"ax": 0.4, "ay": 0.4, "d2": (0.3, 0.3, 0.3), "g4": 0.2, "strength": 2},
+            {"ax": 0.4, "ay": 0.4, "d2": (0.3, 0.3, 0.3), "g4": 0.2, "strength": 2, "rim": 0.7},
+            {"ax": 0.4, "ay": 0.4, "about": 0},
         ],
         cosines=[1, 0.5, 0.1],
         # Logarithms as large as 70 are added, whose rounding errors are those of a number near 70.
