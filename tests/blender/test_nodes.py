@@ -124,10 +124,10 @@ def flat_lamps(scene):
 
 def softboxes(scene):
     """They face the ball; circles around neighbours overlap."""
-    for angle in np.radians((-60, -20, 20, 60)):
+    for angle in np.radians((-50, -25, 0, 25, 50)):
         add_lamp(
             scene, "AREA", f"At {angle:.1f}", (4 * np.sin(angle), -4 * np.cos(angle), 0),
-            (math.pi / 2, 0, angle), energy=150, shape="SQUARE", size=2.4,
+            (math.pi / 2, 0, angle), energy=150, shape="SQUARE", size=1.35,
         )  # fmt: skip
 
 
