@@ -9,7 +9,7 @@ import bpy
 from . import lamps, operators, usd
 from .common import enabling, i18n
 from .gltf import glTF2ExportUserExtension as glTF2ExportUserExtension
-from .groups import automatic, choice_sockets, imports, update
+from .groups import automatic, choice_sockets, imports, titles, update
 from .panels import plot_panel, ui
 from .warnings import closure_slots, console
 
@@ -37,6 +37,7 @@ def register():
     automatic.register()  # after lamps: its handlers read how many there are
     imports.register()
     update.register()
+    titles.register()
     console.register()
     usd.register()
     enabling.set_registered(True)
@@ -46,6 +47,7 @@ def unregister():
     enabling.set_registered(False)
     usd.unregister()
     console.unregister()
+    titles.unregister()
     update.unregister()
     imports.unregister()
     lamps.unregister()
