@@ -32,12 +32,12 @@ def register():
     operators.register()
     ui.register()
     plot_panel.register()
+    titles.register()  # before what removes groups that its handler would meet
     lamps.register()
     choice_sockets.register()  # before what makes groups anew
     automatic.register()  # after lamps: its handlers read how many there are
     imports.register()
     update.register()
-    titles.register()
     console.register()
     usd.register()
     enabling.set_registered(True)
@@ -47,10 +47,10 @@ def unregister():
     enabling.set_registered(False)
     usd.unregister()
     console.unregister()
-    titles.unregister()
     update.unregister()
     imports.unregister()
     lamps.unregister()
+    titles.unregister()
     automatic.unregister()
     choice_sockets.unregister()
     plot_panel.unregister()

@@ -15,6 +15,10 @@ from . import model_nodes
 _known = {}
 
 
+#: What has nodes of models.
+_OWNERS = bpy.types.Material | bpy.types.ShaderNodeTree
+
+
 def _label(node):
     if not model_nodes.is_ours(node):
         return None
@@ -53,7 +57,8 @@ def _follow(block):
 @persistent
 def _after_update(_scene, depsgraph):
     try:
-        for block in dict.fromkeys(update.id.original for update in depsgraph.updates):
+        changed = [update.id for update in depsgraph.updates if isinstance(update.id, _OWNERS)]
+        for block in dict.fromkeys(evaluated.original for evaluated in changed):
             _follow(block)
     except pack.PackError:  # the panel says so
         pass
