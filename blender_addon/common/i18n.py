@@ -7,6 +7,7 @@ scripts and logs, translated where they are shown.
 """
 
 import json
+from collections import Counter
 from pathlib import Path
 
 from . import extension
@@ -84,6 +85,14 @@ def tip(text):
 def rpt(text):
     """The same for reports."""
     return _shown("rpt", text)
+
+
+def counted(names):
+    """Names for a list: one that several things have is said once, with their count."""
+    return [
+        name if count == 1 else say("{count} x {name}", count=count, name=name)
+        for name, count in Counter(names).items()
+    ]
 
 
 #: Display names of forms, where they differ from the names in scripts.

@@ -6,8 +6,10 @@ A twin runs where Open Shading Language does not: EEVEE, any GPU, render farms. 
 tables and writes them to the extension's twins/*.json; the wiring of the nodes is here.
 """
 
+import contextlib
 import hashlib
 import math
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -36,18 +38,42 @@ def _hash_of(image):
     return hashlib.sha256(pixels.tobytes()).hexdigest()[:16]
 
 
-def painted_tables():
-    """The images of tables that were painted on: Texture Paint offers them, as all images of
-    materials. What is not yet packed is undone."""
+def spoilt_tables(unpacked_only=False):
+    """The images of tables that hold other numbers: Texture Paint offers them, as all images of
+    materials, and files that Unpack Resources wrote may be gone. What is not yet packed is undone,
+    and what was unpacked is packed again. `unpacked_only`: without a look at packed images."""
     found = set()
     for image in bpy.data.images:
         if image.library is not None or TABLE not in image:
             continue
+        if unpacked_only and image.packed_file is not None:
+            continue
         if image.is_dirty:
             image.reload()
-        if _hash_of(image) != image[TABLE]:
+        if _hash_of(image) != image[TABLE] or not _packed(image):
             found.add(image)
     return found
+
+
+def _packed(image):
+    """Packs an image into the file, unless it is. Returns whether it is packed then."""
+    if image.packed_file is None:
+        with contextlib.suppress(RuntimeError):
+            image.pack()
+    return image.packed_file is not None
+
+
+def missing_tables():
+    """The images of tables, also of linked files, whose files were unpacked and are gone."""
+    return {
+        image
+        for image in bpy.data.images
+        if TABLE in image and image.packed_file is None and _is_gone(image)
+    }
+
+
+def _is_gone(image):
+    return not Path(bpy.path.abspath(image.filepath, library=image.library)).is_file()
 
 
 class Picture:

@@ -6,7 +6,7 @@ import bpy
 from ..content import group_content
 from ..trees import animation, shader_trees, shader_values
 from .node_values import has_own_animation
-from .planned_node import HELPS
+from .references import HELPS, helpers, refer
 
 
 class AddedNodes:
@@ -55,10 +55,11 @@ class AddedNodes:
     def _helper(self, kind):
         """A node that is added along with a group to replace the node."""
         tree, group = self._tree, self._group
-        count = sum(n.get(HELPS) == group.name for n in tree.nodes)
+        count = len(helpers(group))
         helper = tree.nodes.new(kind)
         helper.location = (group.location.x + 220, group.location.y + 60 - 60 * count)
-        helper.hide, helper[HELPS] = True, group.name
+        helper.hide = True
+        refer(helper, HELPS, group)
         return helper
 
     def _sum(self, first, second):

@@ -11,7 +11,7 @@ from ..packs import pack
 from ..trees import animation
 from .instances import Instances
 from .node_values import KINDS
-from .planned_node import HELPS
+from .references import HELPS, find, helpers, unmark
 from .replacement import BEFORE, CORRECTED, INPUT, MOVED, PreparedPart, Replacement
 
 
@@ -55,18 +55,13 @@ def is_of_conversion(node):
 
 
 def _before(group):
-    before = group.id_data.nodes.get(group[BEFORE])
+    before = find(group, BEFORE, group[BEFORE])
     return before if before is not None and before.bl_idname in KINDS else None
 
 
-def _helpers(group):
-    """The nodes that were added along with a group."""
-    return [n for n in group.id_data.nodes if n.get(HELPS) == group.name]
-
-
-def _outgoing(group, helpers):
+def _outgoing(group, added):
     """The outgoing links of a group and of the nodes added along with it."""
-    every = [group, *helpers]
+    every = [group, *added]
     shaders = [s for node in every for s in node.outputs if s.type == "SHADER"]
     return [link for s in shaders for link in s.links if link.to_node not in every]
 
@@ -81,7 +76,7 @@ def restore(material):
         editable.check(block)
     for group, before in pairs:
         if before is None:  # refuses before anything is changed
-            for model in (group, *filter(model_nodes.is_ours, _helpers(group))):
+            for model in (group, *filter(model_nodes.is_ours, helpers(group))):
                 pack.model(model_nodes.identity(model).model).resolve(
                     "twin", model_nodes.all_values(model)
                 )
@@ -112,20 +107,21 @@ def _moved_back(node, before):
 
 
 def _restore_node(group, before, readers):
-    tree, helpers = group.id_data, _helpers(group)
+    tree, added = group.id_data, helpers(group)
     if before is None:
-        for model in [group, *filter(model_nodes.is_ours, helpers)]:
+        for model in [group, *filter(model_nodes.is_ours, added)]:
             nodes.switch(model, "twin")
         for key in (BEFORE, CORRECTED, MOVED):
             group.pop(key, None)
         return
-    moved = [pair for node in (group, *helpers) for pair in _moved_back(node, before)]
+    moved = [pair for node in (group, *added) for pair in _moved_back(node, before)]
     animation.move(moved, readers)
-    for link in _outgoing(group, helpers):
+    for link in _outgoing(group, added):
         target = link.to_socket
         tree.links.remove(link)
         tree.links.new(before.outputs[0], target)
     before.location = group.location
-    for helper in helpers:
+    unmark(before)
+    for helper in added:
         tree.nodes.remove(helper)
     tree.nodes.remove(group)

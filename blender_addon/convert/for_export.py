@@ -13,7 +13,7 @@ from ..packs import pack
 from ..plotting import nearest_node
 from ..trees import shader_trees
 from .apply_restore import is_converted
-from .planned_node import HELPS
+from .references import HELPS, find, helpers, mark, refer
 
 #: Custom property of a Principled node: name of the node that it replaces, and identifier of that
 #: node's output.
@@ -83,6 +83,7 @@ def replace_by_principled(material):
     tree = surface.id_data
     node = _add(tree, near, surface.from_node)
     node[_REPLACES] = [surface.from_node.name, surface.from_socket.identifier]
+    mark(node, _REPLACES, surface.from_node)
     if color:
         _link_color(tree, node, color)
     for name, outputs in vectors.items():
@@ -107,7 +108,7 @@ def restore_models(material):
     for node, output in pairs:
         for link in list(node.outputs[0].links):
             tree.links.new(output, link.to_socket)
-        for helper in [n for n in tree.nodes if n.get(HELPS) == node.name]:
+        for helper in helpers(node):
             tree.nodes.remove(helper)
         tree.nodes.remove(node)
     return bool(pairs)
@@ -119,7 +120,7 @@ def _nodes(material):
 
 def _replaced(material, node):
     name, identifier = node[_REPLACES]
-    before = material.node_tree.nodes.get(name)
+    before = find(node, _REPLACES, name)
     output = before and next((o for o in before.outputs if o.identifier == identifier), None)
     if output is None:
         raise ValueError(
@@ -212,6 +213,7 @@ def _link_color(tree, node, color):
         tree.links.new(color.output, target)
         return
     helper.location = (node.location.x - 220, node.location.y)
-    helper.hide, helper[HELPS] = True, node.name
+    helper.hide = True
+    refer(helper, HELPS, node)
     tree.links.new(color.output, source)
     tree.links.new(output, target)

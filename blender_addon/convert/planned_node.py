@@ -22,8 +22,6 @@ from .kept_effects import (
 from .node_values import ANISOTROPY, KINDS
 from .seen_node import SeenNode
 
-#: Custom property of the nodes that were added along with it: the name of the group node.
-HELPS = "brdfc_helps"
 #: A row of a plan names this many other materials at most.
 _MOST_NAMES = 6
 #: A plan with a larger error is refused, unless another limit is given.

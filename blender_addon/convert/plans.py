@@ -45,7 +45,8 @@ from .node_values import (
     is_transparent,
     varying_of,
 )
-from .planned_node import HELPS, Part, Plan
+from .planned_node import Part, Plan
+from .references import HELPS
 from .seen_node import SeenNode
 
 #: The model of smooth glass.

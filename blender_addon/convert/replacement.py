@@ -11,7 +11,7 @@ from ..trees import animation, shader_trees, shader_values
 from .effect_nodes import EffectNodes
 from .kept_effects import TRANSMISSION
 from .node_values import ANISOTROPY, KINDS, RATIO
-from .planned_node import HELPS
+from .references import HELPS, helpers, refer
 
 #: Custom property of a group node: the name of the node that it replaces.
 BEFORE = "brdfc_before"
@@ -51,13 +51,12 @@ class Replacement(EffectNodes):
         self._turned = None
         groups = [self._add(prepared) for prepared in parts]
         self._group, *others = groups
-        self._group[BEFORE] = self._node.name
+        refer(self._group, BEFORE, self._node)
         for i, other in enumerate(others):
-            other[HELPS] = self._group.name
+            refer(other, HELPS, self._group)
             other.location.y -= 300 * (i + 1)
-            for helper in self._tree.nodes:
-                if helper.get(HELPS) == other.name:
-                    helper[HELPS] = self._group.name
+            for helper in helpers(other):
+                refer(helper, HELPS, self._group)
         for prepared, group in zip(parts, groups, strict=True):
             for name, parameter in prepared.part.links.items():
                 if self._direct.get(parameter) == (prepared.part, name):

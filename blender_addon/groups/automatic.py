@@ -78,9 +78,17 @@ def _before_render(scene, *_):
 
 
 @persistent
+def _before_job(scene, *_):
+    """Before a render that may have many frames."""
+    _restore_tables(unpacked_only=True)
+    _before_render(scene)
+
+
+@persistent
 def _before_bake(*_):
     """Baking textures calls no other handler."""
     if _rendering is None:
+        _restore_tables(unpacked_only=True)
         follow_quietly()
 
 
@@ -95,23 +103,28 @@ def _now(*_):
 @persistent
 def _before_save(*_):
     """Blender would write the parts of a group that has no user, up to 11 MB, and drop one level of
-    them each time that the file is opened. And it would keep what was painted on tables."""
+    them each time that the file is opened. And it would keep what was painted on tables, and leave
+    out tables that were unpacked."""
     if not nodes.is_at_work():
         nodes.remove_unused_groups()
         _restore_tables()
     _now()
 
 
-def _restore_tables():
+def _restore_tables(unpacked_only=False):
+    if nodes.is_at_work():
+        return
     try:
-        _filled.update(group.session_uid for group in nodes.restore_tables())
-    except RuntimeError as error:  # CompileError: the file is saved with what was painted
+        filled = nodes.restore_tables(unpacked_only)
+        _filled.update(group.session_uid for group in filled)
+    except RuntimeError as error:  # CompileError: tables stay as they are
         print(f"brdfc: {of_error(error)[0]}")
 
 
 @persistent
 def _after_load(*_):
     _filled.clear()
+    _restore_tables(unpacked_only=True)
     _now()
 
 
@@ -126,7 +139,7 @@ _HANDLERS = {
     "depsgraph_update_post": _after_update,
     "frame_change_post": _after_frame,
     "object_bake_pre": _before_bake,
-    "render_init": _before_render,
+    "render_init": _before_job,
     "render_pre": _before_render,
     "render_complete": _now,
     "render_cancel": _now,

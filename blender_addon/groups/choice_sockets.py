@@ -46,8 +46,7 @@ def carry():
         saved = node[_SAVED].to_dict() if _SAVED in node else {}
         known = {name: value for name, value in saved.items() if value in choices.get(name, ())}
         try:
-            form = "auto" if model_nodes.is_automatic(node) else model_nodes.identity(node).form
-            nodes.switch(node, form, known)
+            nodes.renew(node, known)
         except (ValueError, RuntimeError) as error:  # CompileError and PackError are RuntimeErrors
             print(f"brdfc: {of_error(error)[0]}")
             continue

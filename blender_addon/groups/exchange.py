@@ -12,6 +12,14 @@ def has_linked_outputs(node, group):
     return names >= {output.name for output in node.outputs if output.is_linked}
 
 
+#: Types of sockets whose values every group of a model can hold: numbers and colours.
+_PLAIN = ("VALUE", "RGBA")
+
+
+def _copied(value):
+    return value if isinstance(value, float) else tuple(value)
+
+
 def replace_group(node, group):
     """Puts another group of the same model into a group node; values, links, animation and which
     sockets are hidden stay. Animation of inputs that the new group lacks is muted. If it raises,
@@ -23,6 +31,12 @@ def replace_group(node, group):
     names = {s.identifier: name for name, s in sockets.items()}
     animated = [(*moves, names.get(identifier)) for *moves, identifier in animation.capture(node)]
     values = model_nodes.all_values(node)
+    # A link hides the value of its socket, which shows again without the link.
+    under_links = {
+        name: _copied(s.default_value)
+        for name, s in sockets.items()
+        if s.is_linked and s.type in _PLAIN
+    }
     incoming = [
         (link.from_socket, name, link.is_muted) for name, s in sockets.items() for link in s.links
     ]
@@ -35,6 +49,9 @@ def replace_group(node, group):
     def put(group):
         node.node_tree = group
         present = model_nodes.sockets(node)
+        for name, value in under_links.items():
+            if name in present and present[name].type in _PLAIN:
+                present[name].default_value = value
         for name, value in values.items():
             if name in present and value is not None:
                 model_nodes.set_value(node, name, value)

@@ -77,6 +77,11 @@ def is_automatic(node):
     return AUTO in tag and not keeps_form(tag)
 
 
+def asked_form(node):
+    """The form that was asked for: "auto" of a node that adapts it to the scene."""
+    return "auto" if is_automatic(node) else identity(node).form
+
+
 def keeps_form(tag):
     """Whether a group of Formula Nodes that adapts to the scene was asked for by name, by its
     tag."""
@@ -263,6 +268,12 @@ def is_closure(node):
 def uses_albedo(node):
     """Whether a group node's Albedo output is linked."""
     return ALBEDO in node.outputs and node.outputs[ALBEDO].is_linked
+
+
+def has_asked_albedo(node):
+    """Whether a group was made with an Albedo output that its form has only if asked to."""
+    tag = node.node_tree[TAG]
+    return bool(tag.get("with_albedo")) if AUTO in tag else "albedo_inputs" in tag
 
 
 def _trees(tree, seen):

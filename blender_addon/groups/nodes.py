@@ -14,6 +14,7 @@ from .. import lamps
 from ..common import editable, enabling
 from ..common.i18n import say
 from ..content import group_content, part_groups, stand_in, twin
+from ..content.compiler import CompileError
 from ..content.group_content import ALBEDO, script_problem
 from ..content.group_sockets import has_own_choices
 from ..packs import device, pack
@@ -125,6 +126,15 @@ def ensure_group(model_name, representation="auto", baked=None, albedo=False, va
         with_osl = model.automatic(values)
         if model.native_form and not with_osl.is_native:
             return _ensure_automatic(with_osl, albedo)
+        if not with_osl.is_native and not pack.osl_available():
+            raise CompileError(
+                say(
+                    "{model} needs Open Shading Language, which this Blender was built without: it "
+                    "can't be made here. In files from elsewhere Blender's own nodes stand in for "
+                    "it",
+                    model=model.label,
+                )
+            )
     form = model.resolve(representation, values)
     if form.is_native and form.lamps and not baked:
         return _ensure_automatic(form, albedo)
@@ -344,16 +354,32 @@ def make_local(tree):
             make_local(node.node_tree)
 
 
-def restore_tables():
-    """Makes the groups anew whose tables were painted on. Returns those that adapt to the scene,
-    which were filled again."""
+def _images(group):
+    """The images that a group reads; None among them stands for one that was deleted."""
+    return {n.image for n in group.nodes if n.bl_idname == "ShaderNodeTexImage"}
+
+
+def lacks_tables(node):
+    """The images of tables that a group node reads and that are gone."""
+    if not (missing := twin.missing_tables()):
+        return []
+    read = set().union(*map(_images, with_parts([node.node_tree])))
+    return sorted(missing & read, key=lambda image: image.name)
+
+
+def restore_tables(unpacked_only=False):
+    """Makes the groups anew whose tables were painted on, or are gone. Returns those that adapt to
+    the scene, which were filled again. `unpacked_only`: as for twin.spoilt_tables(), and deleted
+    images are left alone."""
     filled = []
-    if not (painted := twin.painted_tables()):
+    spoilt = twin.spoilt_tables(unpacked_only)
+    if unpacked_only and not spoilt:
         return filled
     for group in [g for g in bpy.data.node_groups if TAG in g and g.library is None]:
-        images = {n.image for n in group.nodes if n.bl_idname == "ShaderNodeTexImage"}
         tag = group[TAG]
-        if not images & painted or not model_nodes.is_current(group) or "baked" in tag:
+        if not _images(group) & {*spoilt, None}:
+            continue
+        if not model_nodes.is_current(group) or "baked" in tag:
             continue
         form = pack.model(tag["model"]).forms[tag["representation"]]
         if AUTO in tag:
@@ -420,15 +446,24 @@ def switch(node, representation, known=None):
     Raises ValueError, also if the file would not keep the change, and CompileError; the node is
     then as it was.
     """
+    _switch(node, representation, known or {}, model_nodes.uses_albedo(node))
+
+
+def renew(node, known=None):
+    """Gives a group node the group that the installed version and this Blender make for it: what
+    adapts to the scene continues to, and an Albedo output that was asked for stays without a
+    link. `known` and errors as for switch()."""
+    albedo = model_nodes.uses_albedo(node) or model_nodes.has_asked_albedo(node)
+    _switch(node, model_nodes.asked_form(node), known or {}, albedo)
+
+
+def _switch(node, representation, known, albedo):
     editable.check(node.id_data)
     model_name, _ = model_nodes.identity(node)
-    known = known or {}
     values = model_nodes.constants(node) | known
     if representation != "auto":
         pack.model(model_name).resolve(representation, values)
-    group = ensure_group(
-        model_name, representation, albedo=model_nodes.uses_albedo(node), values=values
-    )
+    group = ensure_group(model_name, representation, albedo=albedo, values=values)
     _exchange(node, group)
     for name, value in known.items():
         model_nodes.set_value(node, name, value)

@@ -57,8 +57,12 @@ def put_layers(tree, top, others):
 def add_coat(coat, surface):
     """Puts a model's node over the shader that a link leads to a surface. Raises what
     nodes.add_albedo() raises."""
-    target = surface.to_socket
-    _lead_to(_put_over(coat, surface.from_socket), target)
+    target, node = surface.to_socket, surface.from_node
+    shown = _put_over(coat, surface.from_socket)
+    # A Principled node is so tall that above it the coat would be out of sight.
+    coat.location = (node.location.x + node.width + 60, node.location.y)
+    shown.node.location = (coat.location.x + coat.width + 60, node.location.y)
+    _lead_to(shown, target)
 
 
 def _put_over(layer, below):

@@ -97,9 +97,11 @@ def refusal(material, node):
 
 
 def update():
-    """Gives every node of another version the shader of this one; values, links and forms stay.
+    """Gives every node of another version the shader of this one; values, links and forms stay,
+    and so does "auto".
 
-    A form that no longer exists becomes "auto". Nothing is lost: a node whose settings can't be
+    A form that no longer exists becomes "auto", and a lean node gets the whole model, as only a
+    plan can make another lean one. Nothing is lost: a node whose settings can't be
     kept stays as it is, and its old shader continues to render. Returns an Update.
     """
     count, refusals, notes = 0, [], []
@@ -108,21 +110,24 @@ def update():
         if why := refusal(material, node):
             refusals.append(say("{node}: {what}", node=what, what=why))
             continue
-        model_name, form = model_nodes.identity(node)
+        before, was_lean = model_nodes.identity(node).form, model_nodes.is_baked(node)
         try:
             try:
-                nodes.switch(node, form)
+                nodes.renew(node)
             except ValueError:
                 nodes.switch(node, "auto")
                 said = say(
                     "{before} is now {after}",
-                    before=form_name(form),
+                    before=form_name(before),
                     after=form_name(model_nodes.identity(node).form),
                 )
                 notes.append(say("{node}: {what}", node=what, what=said))
         except (ValueError, RuntimeError) as error:  # CompileError and PackError are RuntimeErrors
             refusals.append(say("{node}: {what}", node=what, what=of_error(error)[0]))
             continue
+        if was_lean:
+            said = say("it was lean and has the whole model now")
+            notes.append(say("{node}: {what}", node=what, what=said))
         count += 1
     nodes.remove_unused_groups()
     return Update(count, tuple(refusals), tuple(notes))

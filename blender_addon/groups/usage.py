@@ -43,7 +43,7 @@ def _use(material, node):
     for name in model.parameters:
         value = None if name in varying else model_nodes.get_value(node, name)
         parameters[name] = VARIES if value is None else _as_typed(value)
-    asked = "auto" if model_nodes.is_automatic(node) else representation
+    asked = model_nodes.asked_form(node)
     entry = {"model": model_name, "representation": asked, "parameters": parameters}
     return Use(
         material,

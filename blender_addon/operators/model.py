@@ -18,6 +18,12 @@ from ..panels.methods import METHODS
 from .common import ERRORS, ChangesActiveMaterial, OfActiveMaterial, refused
 
 
+def _what_has(node):
+    """What the panel shows as a node's model and render method."""
+    model_name, _ = model_nodes.identity(node)
+    return model_name, model_nodes.asked_form(node), model_nodes.is_baked(node)
+
+
 class BRDFC_OT_switch(ChangesActiveMaterial, Operator):
     bl_idname = "brdfc.switch"
     bl_label = "Switch Render Method"
@@ -45,14 +51,14 @@ class BRDFC_OT_switch(ChangesActiveMaterial, Operator):
         materials = bpy.data.materials if self.all_users else [material]
         try:
             node = model_nodes.named(material, self.node)
-            identity = model_nodes.identity(node)
+            wanted = _what_has(node)
             editable.check(node.id_data)
             # All nodes are found before any is changed. Groups are shared by materials.
             alike = [
                 other
                 for user in filter(editable.keeps_changes, materials)
                 for other in model_nodes.group_nodes(user)
-                if editable.keeps_changes(other.id_data) and model_nodes.identity(other) == identity
+                if editable.keeps_changes(other.id_data) and _what_has(other) == wanted
             ]
             changed = dict.fromkeys(alike) if self.all_users else [node]
             for other in changed:

@@ -76,7 +76,8 @@ class BrdfcPreferences(AddonPreferences):
     program: StringProperty(
         name="Program brdfc",
         description=(
-            "The program that Bake Lean Materials runs. If empty, it is searched for on the PATH"
+            "The program that Bake Lean Materials, New Measured Material and New Measured Library "
+            "run. If empty, it is searched for on the PATH"
         ),
         subtype="FILE_PATH",
     )

@@ -9,8 +9,9 @@ from bpy.types import Menu, Panel
 
 from .. import convert, lamps
 from ..common import color, editable
-from ..common.i18n import form_name, iface, in_percent, of_error, say
+from ..common.i18n import counted, form_name, iface, in_percent, of_error, say
 from ..common.interface import material_of, may_have_surface
+from ..common.search_texts import ordered
 from ..groups import model_nodes, nodes
 from ..packs import energy, kernel, optical, pack
 from ..trees import shader_trees
@@ -29,10 +30,11 @@ LOOKS = {
 }
 
 
-def menu_label(name):
-    """A model's label with its paper's authors and year, all of which the menu search finds."""
-    model = pack.model(name)
-    return f"{model.label} ({model.citation})"
+def menu_labels():
+    """Each model's label with its paper's authors and year, all of which the menu search finds."""
+    models = {name: pack.model(name) for name in pack.model_names()}
+    texts = ordered({model.label: f"{model.label} ({model.citation})" for model in models.values()})
+    return {name: texts[model.label] for name, model in models.items()}
 
 
 def _draw_looks(menu, _context):
@@ -43,10 +45,10 @@ def _draw_looks(menu, _context):
 
 
 def _draw_models(menu, _context):
+    labels = menu_labels()
     for name in pack.models_by_look()[menu.look]:
         # Names from the papers are not translated.
-        text = menu_label(name)
-        item = menu.layout.operator(menu.operator, text=text, translate=False)
+        item = menu.layout.operator(menu.operator, text=labels[name], translate=False)
         item.model = name
         item.representation = "auto"
 
@@ -258,6 +260,9 @@ def draw_node(layout, node, scene):
     """Shows model, form, error, cost, energy and values of a group node."""
     model_name, _ = model_nodes.identity(node)
     layout.label(text=node.label or node.name, icon="MATERIAL", translate=False)
+    if node.mute:
+        said = say("This node is muted, and a muted shader is black: press M to unmute it")
+        wrapped(layout.column(align=True), said, "INFO")
     changes = editable.keeps_changes(node.id_data)
     if made := model_nodes.manifest_entry(node):
         model = pack.model(model_name)
@@ -278,6 +283,10 @@ def draw_node(layout, node, scene):
         layout.operator("brdfc.kernel", icon="FCURVE").node = model_nodes.key(node)
 
 
+def _listed(names):
+    return ", ".join(map(iface, counted(names)))
+
+
 def draw_lamps(layout, material, scene):
     """Shows the lamps that the material's models aim at, if any of them does."""
     forms = [
@@ -292,9 +301,9 @@ def draw_lamps(layout, material, scene):
     # A material that is linked has the lamps of its file.
     theirs = model_nodes.lamps_of_other_file(material)
     found = lamps.last_found(scene, theirs)
-    taken = [iface(lamp.name) for lamp in found if lamp.slot is not None and lamp.slot <= slots]
+    taken = [lamp.name for lamp in found if lamp.slot is not None and lamp.slot <= slots]
     if taken:
-        said = say("Free of noise under {lamps}", lamps=", ".join(taken))
+        said = say("Free of noise under {lamps}", lamps=_listed(taken))
     else:
         said = say("Free of noise under no lamp yet")
     wrapped(box.column(align=True), said, "LIGHT")
@@ -303,7 +312,7 @@ def draw_lamps(layout, material, scene):
             "The viewport uses the lamps of {scene}, the scene of the first window, so {lamps} may "
             "be noisy or missing there; pictures are right",
             scene=lamps.current_scene().name,
-            lamps=", ".join(iface(lamp.name) for lamp in missing),
+            lamps=_listed(lamp.name for lamp in missing),
         )
         wrapped(box.column(align=True), said, "INFO")
     limit = closure_slots.lamps_that_fit()

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Predicates of warnings about a scene's lamps: what makes a material wrong or noisy under them."""
 
+from collections import Counter
+
 from .. import lamps
-from ..common.i18n import say
+from ..common.i18n import counted, say
 from ..groups import model_nodes
 
 #: Fraction of the scene's light below which the noise of a lamp is invisible among the others.
@@ -13,12 +15,12 @@ UNSEEN = 0.01
 
 def _names(found):
     """The names of a few objects or lamps, for a message."""
-    names = found[0].name
-    for item in found[1:3]:
-        names = say("{lamps}, {lamp}", lamps=names, lamp=item.name)
-    return (
-        say("{lamps} and {count} more", lamps=names, count=len(found) - 3) if found[3:] else names
-    )
+    of = Counter(item.name for item in found)
+    names, *others = counted(item.name for item in found)[:3]
+    for other in others:
+        names = say("{lamps}, {lamp}", lamps=names, lamp=other)
+    more = sum([*of.values()][3:])
+    return say("{lamps} and {count} more", lamps=names, count=more) if more else names
 
 
 def _any(found):

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Predicates of warnings about a group node: its shader, its version and its values."""
 
-from ..common.i18n import form_name
+from ..common.i18n import form_name, say
 from ..groups import model_nodes, nodes
+from ..packs import pack
 from ..packs.parameter_values import unused_parameters, value_text
 from .rows import when
 
@@ -12,6 +13,13 @@ def damaged(at):
     or all nodes of such a group."""
     problem = nodes.script_problem(at.node.node_tree)
     return when(problem, problem=problem)
+
+
+def lost_tables(at):
+    """An image with a table of the node's shader was unpacked, its file is gone, and the extension
+    can't make it again: the material is linked, lean or of another version."""
+    found = [image.name for image in nodes.lacks_tables(at.node)]
+    return when(found, images=", ".join(found))
 
 
 def of_later_version(at):
@@ -28,7 +36,18 @@ def of_version_kept(at):
 
 def of_another_version(at):
     """Another version of the extension made the node."""
-    return when(not at.is_current and not model_nodes.is_newer(at.node) and not at.why_kept)
+    of_other = not at.is_current and not model_nodes.is_newer(at.node) and not at.why_kept
+    own = pack.manifest()["generator"]
+    return when(of_other, maker=_maker(at.node, own), own=own)
+
+
+def _maker(node, own):
+    """What made a node's group, in words."""
+    made_by = model_nodes.made_by(node)
+    if not any(pack.version(made_by)):
+        return say("a first version of brdfc")
+    # A build of changed sources, or an extension that is cut to a scene.
+    return say("another build of {version}", version=made_by) if made_by == own else made_by
 
 
 def _is_within(value, limits):

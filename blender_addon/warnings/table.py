@@ -94,6 +94,13 @@ OF_NODE = (
         more="{problem}",
     ),
     Row(
+        "lost_tables",
+        ERROR,
+        "it renders wrong without its images ({images}), which were unpacked: put their files back "
+        "in place",
+        node_rules.lost_tables,
+    ),
+    Row(
         "newer",
         WARNING,
         "made by a later version, {version}",
@@ -101,7 +108,13 @@ OF_NODE = (
         LOOK_FOR_UPDATES,
     ),
     Row("kept", WARNING, "stays as another version made it: {why}", node_rules.of_version_kept),
-    Row("outdated", WARNING, "made by another version", node_rules.of_another_version, UPDATE),
+    Row(
+        "outdated",
+        WARNING,
+        "made by {maker}; this is {own}",
+        node_rules.of_another_version,
+        UPDATE,
+    ),
     Row(
         "out_of_range",
         ERROR,

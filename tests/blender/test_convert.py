@@ -1307,6 +1307,30 @@ def test_muted_links_stay_at_the_node_of_before(convert):
     assert {link.to_node.bl_idname for link in node.outputs[0].links} == {OUTPUT, other.bl_idname}
 
 
+@pytest.mark.parametrize("named", ["the original node", "the model", "both"])
+def test_back_after_nodes_got_other_names(extension, convert, named):
+    """The names may belong to other nodes meanwhile."""
+    material, node = material_of("principled", Metallic=0.5, Coat_Weight=0.5)
+    tree, source = material.node_tree, node.name
+    link = next(k for k in tree.links if k.from_node == node)
+    output, shown = link.to_node, set(tree.nodes.keys())
+    assert convert.apply(convert.plan([material])) == 1
+    renamed = [node] if named != "the model" else []
+    if named != "the original node":
+        renamed += extension.model_nodes.group_nodes(material)
+    taken = []
+    for one in renamed:
+        name, one.name = one.name, f"Renamed {one.name}"
+        taken.append(tree.nodes.new("ShaderNodeBsdfDiffuse"))
+        taken[-1].name = name
+    assert convert.restore(material) == 1
+    for one in taken:
+        tree.nodes.remove(one)
+    node.name = source
+    assert set(tree.nodes.keys()) == shown
+    assert output.inputs["Surface"].links[0].from_node == node
+
+
 @pytest.mark.skipif(bpy.app.version >= (5, 0, 0), reason="from 5.0 nodes are always used")
 def test_nodes_that_are_not_used_are_not_converted(extension, convert):
     material, node = material_of("principled")

@@ -235,6 +235,31 @@ def test_models_that_are_gone_are_named(extension, empty):
     assert _state(material) == before
 
 
+def test_models_come_back_after_nodes_got_other_names(extension, empty):
+    """Another node may have the name meanwhile."""
+    material = extension.api.new_material("ward")
+    tree = material.node_tree
+    tree.links.new(
+        tree.nodes.new("ShaderNodeTexImage").outputs[0],
+        extension.model_nodes.sockets(extension.model_nodes.group_nodes(material)[0])["ax"],
+    )
+    before = _state(material)
+    extension.api.replace_by_principled(material)
+    (node,) = extension.model_nodes.group_nodes(material)
+    name = node.name
+    node.name = "Varnish"
+    other = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    other.name = name
+    principled, own = _principled(material), "Principled BSDF"
+    principled.name = "For Export"
+    tree.nodes.new("ShaderNodeBsdfPrincipled").name = own
+    assert extension.api.restore_models(material)
+    tree.nodes.remove(other)
+    tree.nodes.remove(tree.nodes[own])
+    node.name = name
+    assert _state(material) == before
+
+
 def test_operators(extension, empty):
     """Of all selected objects; materials without models stay."""
     made = [_sum(extension.api), _without_models(extension.api), _with_glass(extension.api)]

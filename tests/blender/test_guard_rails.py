@@ -3,6 +3,7 @@
 versions of the extension made."""
 
 import contextlib
+import json
 import time
 from importlib import import_module
 from pathlib import Path
@@ -72,6 +73,8 @@ def test_without_osl_models_are_blenders_own_nodes(extension, empty, monkeypatch
     kept = len(bpy.data.node_groups), len(bpy.data.texts), len(bpy.data.materials)
     with pytest.raises(RuntimeError, match="built without Open Shading Language"):
         extension.api.new_material("phong", "sampled")
+    with pytest.raises(RuntimeError, match="Rough Glass needs Open Shading Language, which this"):
+        extension.api.new_material("rough_glass")
     assert kept == (len(bpy.data.node_groups), len(bpy.data.texts), len(bpy.data.materials))
     found = {f.code: f.severity for f in extension.checks.warnings(named, empty)}
     assert found.pop("no_osl") == "WARNING"
@@ -137,8 +140,8 @@ def test_materials_of_an_older_version_are_updated_at_once(extension, empty, pho
     other = api.new_material("ward", "sampled", ax=0.25, normalisation="duer")
     old = [aged(extension, phong), aged(extension, other)]
     groups = [node.node_tree for node in old]
-    line, button = shown(extension, phong, empty)
-    assert "made by another version" in line
+    *lines, button = shown(extension, phong, empty)
+    assert " ".join(lines).startswith("Phong: made by brdfc 0.0.1; this is brdfc ")
     assert button == "operator brdfc.update Update Materials"
     assert bpy.ops.brdfc.update() == {"FINISHED"}
     assert api.get_parameters(phong)["e"] == pytest.approx(20)
@@ -162,6 +165,150 @@ def test_a_file_of_a_later_version_says_so(extension, empty, phong):
     assert result.count == 0
     assert "brdfc 99.1.0 made it, and this is brdfc" in result.refusals[0]
     assert node.node_tree == group
+
+
+def a_model(api):
+    return api.new_material("ward", ax=0.25)
+
+
+def a_kernel(api):
+    """The choices of some models decide their form."""
+    return api.new_material("radziszewski_alda", around="retro")
+
+
+def a_sum(api):
+    return api.new_sum([("ward", {"ax": 0.25}), ("lambert", {})])
+
+
+def layers(api):
+    return api.new_layers([("ward", {"ax": 0.25}), ("kelemen", {})])
+
+
+def a_coat(api):
+    material = bpy.data.materials.new("Diffuse")
+    if material.node_tree is None:
+        material.use_nodes = True
+    tree = material.node_tree
+    diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
+    api.add_coat(material)
+    return material
+
+
+def state(extension, node):
+    """What an update keeps of a node."""
+    sockets = extension.model_nodes.sockets(node)
+    values = extension.model_nodes.all_values(node)
+    return (
+        extension.model_nodes.is_automatic(node),
+        extension.model_nodes.identity(node),
+        {name: value for name, value in values.items() if name in sockets},
+        [s.name for s in node.inputs],
+        [s.name for s in node.outputs],
+        sorted((s.name, s.is_linked) for s in (*node.inputs, *node.outputs)),
+    )
+
+
+def aged_nodes(extension, material):
+    """All nodes of a material, made to look like those of another version."""
+    ours = extension.model_nodes.group_nodes(material)
+    for node in ours:
+        tag = node.node_tree[extension.model_nodes.TAG]
+        tag["digest"], tag["made_by"] = "of another version", "brdfc 0.0.1"
+    return ours
+
+
+MADE = [a_model, a_kernel, a_sum, layers, a_coat]
+
+
+@pytest.mark.parametrize("osl", [False, True])
+@pytest.mark.parametrize("make", MADE)
+def test_an_update_keeps_automatic_and_all_else_of_a_node(extension, empty, make, osl):
+    extension.scene_loader.apply_clean_settings(empty)
+    empty.cycles.shading_system = osl
+    material = make(extension.api)
+    ours = aged_nodes(extension, material)
+    before = [state(extension, node) for node in ours]
+    assert all(automatic for automatic, *_ in before)
+    result = extension.api.update_materials()
+    assert (result.count, result.refusals, result.notes) == (len(ours), (), ())
+    assert [state(extension, node) for node in ours] == before
+    uses = extension.api.used_materials().values()
+    assert {use["representation"] for use in uses} == {"auto"}
+    for wanted in (not osl, osl):
+        empty.cycles.shading_system = wanted
+        extension.api.follow_settings(empty)
+        tags = [node.node_tree[extension.model_nodes.TAG] for node in ours]
+        native = [tag["representation"] == "nodes" for tag in tags]
+        assert all(native) != wanted, "the material follows the settings as before"
+
+
+@pytest.mark.parametrize("make", MADE)
+def test_a_file_saved_with_osl_is_updated_where_there_is_none(
+    extension, empty, make, monkeypatch, tmp_path
+):
+    extension.scene_loader.apply_clean_settings(empty)
+    material = make(extension.api)
+    aged_nodes(extension, material)
+    material.use_fake_user, name = True, material.name
+    path = tmp_path / "osl.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    preferences = bpy.context.preferences.addons[extension.package].preferences
+    monkeypatch.setattr(import_module("_cycles"), "with_osl", False)
+    preferences.update_on_load = True
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(path))
+    finally:
+        preferences.update_on_load = False
+    update = import_module(f"{extension.package}.groups.update")
+    ours = extension.model_nodes.group_nodes(bpy.data.materials[name])
+    assert (update.last.count, update.last.refusals) == (len(ours), ())
+    for node in ours:
+        assert extension.model_nodes.is_automatic(node)
+        group = extension.model_nodes.content_group(node.node_tree)
+        assert group[extension.model_nodes.TAG]["representation"] == "nodes"
+
+
+def test_an_update_keeps_values_under_links_and_an_albedo_output(extension, empty):
+    extension.scene_loader.apply_clean_settings(empty)
+    for form in ("auto", "aimed"):
+        material = extension.api.new_material("ward", form)
+        extension.api.add_albedo(material)
+        (node,) = extension.model_nodes.group_nodes(material)
+        socket = extension.model_nodes.sockets(node)["ax"]
+        socket.default_value = 0.375
+        value = material.node_tree.nodes.new("ShaderNodeValue")
+        material.node_tree.links.new(value.outputs[0], socket)
+        aged(extension, material)
+        assert extension.api.update_materials().count == 1
+        assert "Albedo" in node.outputs and not node.outputs["Albedo"].is_linked
+        socket = extension.model_nodes.sockets(node)["ax"]
+        assert socket.is_linked and socket.default_value == 0.375
+        extension.api.switch_representation(material, "sampled")
+        socket = extension.model_nodes.sockets(node)["ax"]
+        assert socket.is_linked and socket.default_value == 0.375
+
+
+def test_an_update_says_what_was_lean(extension, empty, phong):
+    node = aged(extension, phong)
+    tag = node.node_tree[extension.model_nodes.TAG]
+    entry = extension.pack.model("phong").forms["aimed"].entry
+    tag["baked"] = json.dumps({"of": "another", "form": entry, "parameters": {}})
+    result = extension.api.update_materials()
+    assert result.count == 1 and not extension.model_nodes.is_baked(node)
+    assert "it was lean and has the whole model now" in result.notes[0]
+
+
+def test_a_build_of_the_same_number_is_told_of_as_such(extension, empty, phong):
+    own = extension.pack.manifest()["generator"]
+    for made_by, said in (
+        (own, f"made by another build of {own}; this is {own}"),
+        ("brdfc 0", f"made by a first version of brdfc; this is {own}"),
+    ):
+        aged(extension, phong, made_by)
+        found = {f.code: f.message for f in extension.checks.warnings(phong, empty)}
+        assert said in found["outdated"]
 
 
 def lose_the_model(tag):

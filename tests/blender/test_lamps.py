@@ -690,6 +690,26 @@ def test_more_lamps_than_slots(extension, ball, empty):
     assert_lamp(slots(empty)[0], bpy.data.objects["Lamp0"])
 
 
+def test_lamps_of_one_name_are_said_once_with_their_count(extension, ball, empty):
+    mesh = bpy.data.meshes.new("bulbs")
+    mesh.from_pydata([(x, -3, 3) for x in range(12)], [], [])
+    bulbs = bpy.data.objects.new("bulbs", mesh)
+    empty.collection.objects.link(bulbs)
+    bulbs.instance_type = "VERTS"
+    bulb = add_lamp(empty, "POINT", "bulb", location=(0, 0, 0), energy=100)
+    bulb.parent = bulbs
+    add_lamp(empty, "POINT", "alone", location=(0, -2, 3), energy=200)
+    slots(empty)
+    lines = helpers.Layout()
+    extension.ui.draw_lamps(lines, ball.active_material, empty)
+    text = " ".join(lines.log)
+    assert "alone" in text and " x bulbs/bulb" in text
+    assert text.count("bulbs/bulb") == 1
+    found = extension.checks.warnings(ball.active_material, empty)
+    said = [f.message for f in found if f.code == "lost_lamps"]
+    assert said and all(sentence.count("bulbs/bulb") == 1 for sentence in said)
+
+
 def test_copies_of_collections(ball, empty):
     collection = bpy.data.collections.new("Lamps")
     lamp = add_lamp(empty, "AREA", "Inner", location=(1, 0, 0), shape="RECTANGLE", size=0.5)

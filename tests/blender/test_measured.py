@@ -293,6 +293,24 @@ def test_a_coat_lies_over_any_nodes(extension, empty, native):
     assert np.abs(picture - 1).max() < 0.02
 
 
+@pytest.mark.parametrize("kind", ["ShaderNodeBsdfPrincipled", "ShaderNodeBsdfDiffuse"])
+def test_a_coat_stands_beside_the_node_that_it_covers(extension, empty, kind):
+    """Above a Principled node it was out of sight. No node covers another one."""
+    material = helpers.node_material(kind)
+    tree = material.node_tree
+    below = next(n for n in tree.nodes if n.bl_idname == kind)
+    below.location = (-40, 200)
+    for _ in range(2):
+        coat = extension.api.add_coat(material)
+        (over,) = (link.to_node for link in coat.outputs["BSDF"].links)
+        output = tree.get_output_node("CYCLES")
+        row = [below, coat, over, output]
+        assert [n.location.y for n in row[:3]] == [200] * 3
+        for left, right in zip(row[:-1], row[1:], strict=True):
+            assert 0 < right.location.x - (left.location.x + left.width) <= 100
+        below = over
+
+
 @pytest.mark.parametrize("model", ["disney", "eon", "factors", "hapke", "thin_film"])
 def test_models_without_an_albedo_are_coats_as_twins(extension, empty, model):
     """As docs/blender.md says, and where they lie below a coat."""

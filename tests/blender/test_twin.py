@@ -2,7 +2,10 @@
 """Twins without Open Shading Language: Blender's own nodes must reproduce what the tool evaluates,
 and replace the shader."""
 
+import contextlib
 import math
+import re
+import shutil
 from importlib import import_module
 
 import bpy
@@ -487,3 +490,126 @@ def test_what_was_painted_on_a_table_is_undone_when_the_file_is_saved(
         np.testing.assert_array_equal(image.pixels[:], pixels)
     (node,) = extension.model_nodes.group_nodes(material)
     assert extension.nodes.script_problem(node.node_tree) is None
+
+
+#: What has images of its own: a twin, formulas, a script's albedo, a coat, a layer, a fit.
+WITH_TABLES = {
+    "twin": lambda api: api.new_material("kelemen", "twin"),
+    "automatic": lambda api: api.new_material("kelemen"),
+    "script": lambda api: api.new_material("ward", "aimed"),
+    "layers": lambda api: api.new_layers([("microfacet", {}), ("ward", {})]),
+    "sum": lambda api: api.new_sum([("kelemen", {}), ("ward", {})]),
+}
+
+
+def _tables(extension):
+    table = import_module(f"{extension.package}.content.twin").TABLE
+    return [i for i in bpy.data.images if table in i]
+
+
+def _numbers(extension):
+    """By the image's name, without the number that Blender appends while another one has it."""
+    return {re.sub(r"\.\d+$", "", i.name): np.array(i.pixels[:]) for i in _tables(extension)}
+
+
+def _unpacked(extension, scene, folder, make):
+    """The name of a material in a file whose images Unpack Resources wrote beside it."""
+    material = make(extension.api)
+    material.use_fake_user = True
+    blend = folder / "unpacked.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    bpy.ops.file.unpack_all(method="USE_LOCAL")
+    assert any((folder / "textures").iterdir())
+    return material.name
+
+
+def _same(found, wanted):
+    assert found.keys() == wanted.keys()
+    for name, numbers in wanted.items():
+        np.testing.assert_array_equal(found[name], numbers)
+
+
+@pytest.mark.parametrize("osl", [False, True])
+@pytest.mark.parametrize("make", WITH_TABLES.values(), ids=WITH_TABLES)
+def test_tables_that_were_unpacked_are_packed_when_the_file_is_saved(
+    extension, empty, tmp_path, make, osl
+):
+    empty.cycles.shading_system = osl
+    _unpacked(extension, empty, tmp_path, make)
+    before = _numbers(extension)
+    assert before
+    assert all(image.packed_file is None for image in _tables(extension))
+    bpy.ops.wm.save_mainfile()
+    assert all(image.packed_file is not None for image in _tables(extension))
+    shutil.rmtree(tmp_path / "textures")
+    bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
+    _same(_numbers(extension), before)
+
+
+@contextlib.contextmanager
+def _without_handlers(name):
+    """Files may be saved where the extension is missing."""
+    handlers = getattr(bpy.app.handlers, name)
+    before = list(handlers)
+    handlers.clear()
+    try:
+        yield
+    finally:
+        handlers.extend(before)
+
+
+@pytest.mark.parametrize("osl", [False, True])
+@pytest.mark.parametrize("make", WITH_TABLES.values(), ids=WITH_TABLES)
+@pytest.mark.parametrize("when", ["opened", "rendered"])
+def test_tables_whose_files_are_gone_are_made_anew(extension, empty, tmp_path, make, osl, when):
+    empty.cycles.shading_system = osl
+    name = _unpacked(extension, empty, tmp_path, make)
+    before = _numbers(extension)
+    with _without_handlers("save_pre"):
+        bpy.ops.wm.save_mainfile()
+    shutil.rmtree(tmp_path / "textures")
+    with contextlib.ExitStack() as stack:
+        if when == "rendered":  # the files went after the file was opened
+            stack.enter_context(_without_handlers("load_post"))
+        bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
+    scene, material = bpy.context.scene, bpy.data.materials[name]
+    if when == "rendered":
+        found = [w for w in extension.api.warnings(material, scene) if w.code == "lost_tables"]
+        assert found and found[0].severity == "ERROR" and "put their files back" in found[0].message
+        add_camera(scene)
+        scene.render.engine, scene.cycles.samples = "CYCLES", 1
+        scene.render.resolution_x = scene.render.resolution_y = 4
+        render(scene)
+    _same(_numbers(extension), before)
+    assert all(image.packed_file is not None for image in _tables(extension))
+    codes = {w.code for w in extension.api.warnings(material, scene)}
+    assert not codes & {"lost_tables", "script_failed"}
+
+
+@pytest.mark.parametrize("of", ["another version", "another file"])
+def test_tables_that_can_not_be_made_again_are_warned_of(extension, empty, tmp_path, of):
+    name = _unpacked(extension, empty, tmp_path, WITH_TABLES["twin"])
+    (image,) = _tables(extension)
+    image = image.name
+    if of == "another version":
+        for group in bpy.data.node_groups:
+            if extension.model_nodes.TAG in group:
+                group[extension.model_nodes.TAG]["digest"] = "of another version"
+    with _without_handlers("save_pre"):
+        bpy.ops.wm.save_mainfile()
+    library = bpy.data.filepath
+    (tmp_path / "textures").rename(tmp_path / "gone")
+    if of == "another version":
+        bpy.ops.wm.open_mainfile(filepath=library)
+    else:
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        with bpy.data.libraries.load(library, link=True) as (there, here):
+            here.materials = [name]
+
+    def said():
+        found = extension.api.warnings(bpy.data.materials[name], bpy.context.scene)
+        return [w.message for w in found if w.code == "lost_tables"]
+
+    assert len(said()) == 1 and image in said()[0]
+    (tmp_path / "gone").rename(tmp_path / "textures")
+    assert said() == []
