@@ -9,7 +9,7 @@ import bpy
 from . import lamps, operators, usd
 from .common import enabling, i18n
 from .gltf import glTF2ExportUserExtension as glTF2ExportUserExtension
-from .groups import automatic, choice_sockets, imports, titles, update
+from .groups import automatic, choice_sockets, imports, update
 from .panels import plot_panel, ui
 from .warnings import closure_slots, console
 
@@ -32,7 +32,6 @@ def register():
     operators.register()
     ui.register()
     plot_panel.register()
-    titles.register()  # before what removes groups that its handler would meet
     lamps.register()
     choice_sockets.register()  # before what makes groups anew
     automatic.register()  # after lamps: its handlers read how many there are
@@ -50,7 +49,6 @@ def unregister():
     update.unregister()
     imports.unregister()
     lamps.unregister()
-    titles.unregister()
     automatic.unregister()
     choice_sockets.unregister()
     plot_panel.unregister()

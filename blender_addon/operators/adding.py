@@ -8,7 +8,6 @@ from bpy.types import Operator
 from .. import api
 from ..common.i18n import rpt, say, tip
 from ..common.interface import may_have_surface
-from ..common.search_texts import ordered
 from ..groups import model_nodes, nodes
 from ..packs import pack
 from .common import ERRORS, keeps_changes, refused, report_osl
@@ -116,9 +115,10 @@ _listed = []
 
 def models_as_items(_operator, _context):
     """Every model as an enum item, which the search finds by label, authors, title and year."""
-    models = api.models()
-    texts = ordered({e["label"]: f"{e['label']} ({e['paper']})" for e in models.values()})
-    found = [(name, texts[entry["label"]], entry["doc"]) for name, entry in models.items()]
+    found = [
+        (name, f"{entry['label']} ({entry['paper']})", entry["doc"])
+        for name, entry in api.models().items()
+    ]
     if _listed != found:
         _listed[:] = found
     return _listed

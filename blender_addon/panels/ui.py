@@ -11,7 +11,6 @@ from .. import convert, lamps
 from ..common import color, editable
 from ..common.i18n import counted, form_name, iface, in_percent, of_error, say
 from ..common.interface import material_of, may_have_surface
-from ..common.search_texts import ordered
 from ..groups import model_nodes, nodes
 from ..packs import energy, kernel, optical, pack
 from ..trees import shader_trees
@@ -30,11 +29,10 @@ LOOKS = {
 }
 
 
-def menu_labels():
-    """Each model's label with its paper's authors and year, all of which the menu search finds."""
-    models = {name: pack.model(name) for name in pack.model_names()}
-    texts = ordered({model.label: f"{model.label} ({model.citation})" for model in models.values()})
-    return {name: texts[model.label] for name, model in models.items()}
+def menu_label(name):
+    """A model's label with its paper's authors and year, all of which the menu search finds."""
+    model = pack.model(name)
+    return f"{model.label} ({model.citation})"
 
 
 def _draw_looks(menu, _context):
@@ -45,10 +43,10 @@ def _draw_looks(menu, _context):
 
 
 def _draw_models(menu, _context):
-    labels = menu_labels()
     for name in pack.models_by_look()[menu.look]:
         # Names from the papers are not translated.
-        item = menu.layout.operator(menu.operator, text=labels[name], translate=False)
+        text = menu_label(name)
+        item = menu.layout.operator(menu.operator, text=text, translate=False)
         item.model = name
         item.representation = "auto"
 
