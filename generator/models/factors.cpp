@@ -25,7 +25,8 @@
 //   lobes of Radziszewski and Alda. 2: on the halfway vector disk of Edwards et al., whose lobes narrow towards the
 //   horizon.
 // 1 / cos^4 theta_h belongs to half vectors: D has its power max(0, min(k, 1)), with which f stays finite at the
-// horizon. All of this is symmetric in i and o. Tried in one channel with values of the models at their defaults, percent of the light that is misplaced:
+// horizon. All of this is symmetric in i and o. Tried in one channel with values of the models at their defaults,
+// percent of the light that is misplaced:
 //                               ashikhmin_shirley  edwards  lafortune  lossless  max_phong  modified_phong  radz._alda
 //   k = 1                                    12       41         27        43         30              21          22
 //   k = 1 or 0                               12       41        2.3        34        3.8            0.76          10
