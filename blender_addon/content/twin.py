@@ -6,10 +6,8 @@ A twin runs where Open Shading Language does not: EEVEE, any GPU, render farms. 
 tables and writes them to the extension's twins/*.json; the wiring of the nodes is here.
 """
 
-import contextlib
 import hashlib
 import math
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -32,48 +30,11 @@ class _Curves:
 TABLE = "brdfc_table"
 
 
-def _hash_of(image):
+def hash_of(image):
+    """A hash of an image's pixels."""
     pixels = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(pixels)
     return hashlib.sha256(pixels.tobytes()).hexdigest()[:16]
-
-
-def spoilt_tables(unpacked_only=False):
-    """The images of tables that hold other numbers: Texture Paint offers them, as all images of
-    materials, and files that Unpack Resources wrote may be gone. What is not yet packed is undone,
-    and what was unpacked is packed again. `unpacked_only`: without a look at packed images."""
-    found = set()
-    for image in bpy.data.images:
-        if image.library is not None or TABLE not in image:
-            continue
-        if unpacked_only and image.packed_file is not None:
-            continue
-        if image.is_dirty:
-            image.reload()
-        if _hash_of(image) != image[TABLE] or not _packed(image):
-            found.add(image)
-    return found
-
-
-def _packed(image):
-    """Packs an image into the file, unless it is. Returns whether it is packed then."""
-    if image.packed_file is None:
-        with contextlib.suppress(RuntimeError):
-            image.pack()
-    return image.packed_file is not None
-
-
-def missing_tables():
-    """The images of tables, also of linked files, whose files were unpacked and are gone."""
-    return {
-        image
-        for image in bpy.data.images
-        if TABLE in image and image.packed_file is None and _is_gone(image)
-    }
-
-
-def _is_gone(image):
-    return not Path(bpy.path.abspath(image.filepath, library=image.library)).is_file()
 
 
 class Picture:
@@ -96,7 +57,7 @@ class Picture:
         self.image.alpha_mode = "NONE"
         self.image.pixels.foreach_set(pixels.ravel())
         self.image.pack()
-        self.image[TABLE] = _hash_of(self.image)
+        self.image[TABLE] = hash_of(self.image)
         # From the centre of the first pixel to the centre of the last.
         self.u = wiring.math("MULTIPLY_ADD", cos_theta, (width - 1) / width, 0.5 / width)
         self.count, self.height = count, height

@@ -20,7 +20,7 @@ from .. import lamps
 from ..common import app_handlers
 from ..common.i18n import of_error
 from ..packs import device
-from . import nodes
+from . import nodes, tables
 
 #: _busy: whether groups are being filled. _rendering: the scene being rendered. Then the
 #: session_uid of the groups that a handler has filled.
@@ -107,7 +107,7 @@ def _before_save(*_):
     out tables that were unpacked."""
     if not nodes.is_at_work():
         nodes.remove_unused_groups()
-        _restore_tables()
+    _restore_tables()
     _now()
 
 
@@ -115,7 +115,7 @@ def _restore_tables(unpacked_only=False):
     if nodes.is_at_work():
         return
     try:
-        filled = nodes.restore_tables(unpacked_only)
+        filled = tables.restore(unpacked_only)
         _filled.update(group.session_uid for group in filled)
     except RuntimeError as error:  # CompileError: tables stay as they are
         print(f"brdfc: {of_error(error)[0]}")

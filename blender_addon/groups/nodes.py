@@ -13,7 +13,7 @@ import bpy
 from .. import lamps
 from ..common import editable, enabling
 from ..common.i18n import say
-from ..content import group_content, part_groups, stand_in, twin
+from ..content import group_content, part_groups, stand_in
 from ..content.compiler import CompileError
 from ..content.group_content import ALBEDO, script_problem
 from ..content.group_sockets import has_own_choices
@@ -354,51 +354,25 @@ def make_local(tree):
             make_local(node.node_tree)
 
 
-def _images(group):
-    """The images that a group reads; None among them stands for one that was deleted."""
-    return {n.image for n in group.nodes if n.bl_idname == "ShaderNodeTexImage"}
-
-
-def lacks_tables(node):
-    """The images of tables that a group node reads and that are gone."""
-    if not (missing := twin.missing_tables()):
-        return []
-    read = set().union(*map(_images, with_parts([node.node_tree])))
-    return sorted(missing & read, key=lambda image: image.name)
-
-
-def restore_tables(unpacked_only=False):
-    """Makes the groups anew whose tables were painted on, or are gone. Returns those that adapt to
-    the scene, which were filled again. `unpacked_only`: as for twin.spoilt_tables(), and deleted
-    images are left alone."""
-    filled = []
-    spoilt = twin.spoilt_tables(unpacked_only)
-    if unpacked_only and not spoilt:
-        return filled
-    for group in [g for g in bpy.data.node_groups if TAG in g and g.library is None]:
-        tag = group[TAG]
-        if not _images(group) & {*spoilt, None}:
-            continue
-        if not model_nodes.is_current(group) or "baked" in tag:
-            continue
-        form = pack.model(tag["model"]).forms[tag["representation"]]
-        if AUTO in tag:
-            # Scripts can't be made beside those that a group has.
-            for step in dict.fromkeys([form.model.native_form, form]):
-                _change_form(group, step, lamps.room_needed)
-            filled.append(group)
-            continue
-        tag["digest"] = ""  # so that another one is made
-        if group_content.is_native(group):
-            made = _group_of(form, _room_of(tag))
-        else:
-            made = ensure_group(form.model.name, form.name, albedo="albedo_inputs" in tag)
-        group.user_remap(made)
-        remove_group(group)
-    for image in [i for i in bpy.data.images if i.library is None and twin.TABLE in i]:
-        if image.users == 0:
-            bpy.data.images.remove(image)
-    return filled
+def make_anew(group):
+    """Makes the content of a group of the installed version anew: fills a group that adapts to the
+    scene again, and puts another one in the place of others. Returns whether the group was filled.
+    Raises CompileError."""
+    tag = group[TAG]
+    form = pack.model(tag["model"]).forms[tag["representation"]]
+    if AUTO in tag:
+        # Scripts can't be made beside those that a group has.
+        for step in dict.fromkeys([form.model.native_form, form]):
+            _change_form(group, step, lamps.room_needed)
+        return True
+    tag["digest"] = ""  # so that another one is made
+    if group_content.is_native(group):
+        made = _group_of(form, _room_of(tag))
+    else:
+        made = ensure_group(form.model.name, form.name, albedo="albedo_inputs" in tag)
+    group.user_remap(made)
+    remove_group(group)
+    return False
 
 
 def remove_group(group):

@@ -2,7 +2,7 @@
 """Predicates of warnings about a group node: its shader, its version and its values."""
 
 from ..common.i18n import form_name, say
-from ..groups import model_nodes, nodes
+from ..groups import model_nodes, nodes, tables
 from ..packs import pack
 from ..packs.parameter_values import unused_parameters, value_text
 from .rows import when
@@ -18,7 +18,7 @@ def damaged(at):
 def lost_tables(at):
     """An image with a table of the node's shader was unpacked, its file is gone, and the extension
     can't make it again: the material is linked, lean or of another version."""
-    found = [image.name for image in nodes.lacks_tables(at.node)]
+    found = [image.name for image in tables.lacking(at.node)]
     return when(found, images=", ".join(found))
 
 
@@ -36,9 +36,10 @@ def of_version_kept(at):
 
 def of_another_version(at):
     """Another version of the extension made the node."""
-    of_other = not at.is_current and not model_nodes.is_newer(at.node) and not at.why_kept
+    if at.is_current or model_nodes.is_newer(at.node) or at.why_kept:
+        return []
     own = pack.manifest()["generator"]
-    return when(of_other, maker=_maker(at.node, own), own=own)
+    return when(True, maker=_maker(at.node, own), own=own)
 
 
 def _maker(node, own):
