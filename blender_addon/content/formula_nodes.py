@@ -173,9 +173,8 @@ def _wired(w, data, normal, tangent, parameters, of_slots, cones, title):
     constants = svm_constants.add_values(w, geometry.outputs["Backfacing"])
     lists = {name: svm_constants.prepared(name, part) for name, part in data["parts"].items()}
     parts = Parts(w, lists, title, constants)
-    parameters = dict(parameters)
-    for name in parameters:
-        parameters[name] = _within(w, parameters[name], *data["bounds"].get(name, (None, None)))
+    bounds = {name: data["bounds"].get(name, (None, None)) for name in parameters}
+    parameters = {name: _within(w, value, *bounds[name]) for name, value in parameters.items()}
     surface = _Surface(w, parts, geometry, normal, None if data["isotropic"] else tangent)
     side = w.math("MULTIPLY_ADD", surface.backfacing, -2.0, 1.0)
     given = {**parameters, **surface.wo, "side": side, "path_length": surface.path_length}

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Predicates of warnings about a scene's lamps: what makes a material wrong or noisy under them."""
 
-from collections import Counter
-
 from .. import lamps
 from ..common.i18n import counted, say
 from ..groups import model_nodes
@@ -15,11 +13,12 @@ UNSEEN = 0.01
 
 def _names(found):
     """The names of a few objects or lamps, for a message."""
-    of = Counter(item.name for item in found)
-    names, *others = counted(item.name for item in found)[:3]
+    every = [item.name for item in found]
+    names, *others = counted(every)[:3]
     for other in others:
         names = say("{lamps}, {lamp}", lamps=names, lamp=other)
-    more = sum([*of.values()][3:])
+    said = [*dict.fromkeys(every)][:3]
+    more = sum(name not in said for name in every)
     return say("{lamps} and {count} more", lamps=names, count=more) if more else names
 
 

@@ -164,7 +164,7 @@ template <class T> struct Factors {
   /// m^(2 - 2k).
   T narrowing(const T& m2) const { return exp((T(1) - about) * log(m2)); }
 
-  /// q - 1, 1 / cos^2 theta_h, and its part in D.
+  /// q - 1, 1 / cos^2 theta_h, and 1 - o.h.
   struct Facet {
     T s2, inverse_cos2, one_minus_oh;
   };
