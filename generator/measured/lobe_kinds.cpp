@@ -27,6 +27,7 @@ const std::vector<KindRow>& rows() {
   static const std::vector<KindRow> out{
       {"lambert", {}, "rho", {}},
       {"oren_nayar", {"form=full"}, "rho", {{{"sigma"}, {Linear, 0.05, 0.66}, 3}}},
+      {"charlie", {"terminator=plain"}, "tint", {{{"r"}, {Log, 0.1, 1}, 5}}},
       {"radziszewski_alda",
        {"proportion=paper", "part=product", "around=reflection"},
        "tint",
@@ -65,6 +66,8 @@ const std::vector<KindRow>& rows() {
       // Smoother ones have a part of an ideal mirror, which no data show.
       {"schlick", {"p=1"}, "r", {{{"rough"}, {Linear, 0.5, 1}, 4}}, Data::Isotropic},
       {"schlick", {}, "r", {{{"rough"}, {Linear, 0.5, 1}, 3}, {{"p"}, {Log, 0.05, 1}, 3}}, Data::Anisotropic},
+      // Matte under a coat.
+      {"ashikhmin_shirley", {"part=diffuse", "diffuse=paper", "rs=0"}, "rd", {}},
       {"ashikhmin_shirley",
        {"part=both", "diffuse=paper", "rd=0"},
        "rs",
@@ -79,6 +82,7 @@ const std::vector<KindRow>& rows() {
       {"modified_phong", {}, "ks", {{{"e"}, {Log1p, 1, 1e4}, 12}}},
       {"max_phong", {}, "ks", {{{"e"}, {Log1p, 1, 1e4}, 12}}},
       {"glossy_reflector", {"kr=1", "below=mirror"}, "cr", {{{"e"}, {Log1p, 1, 1e4}, 12}}},
+      {"edwards", {}, "rho", {{{"e"}, {Log1p, 1, 1e5}, 10}}},
       {"lafortune",
        {},
        "ks",

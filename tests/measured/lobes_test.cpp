@@ -81,6 +81,10 @@ const Known kKnown[] = {
       {"lafortune", {"cxy=1", "cz=0.9", "e=12", "ks=0.2,0.25,0.1"}},
       {"cook_torrance", {"m=0.2", "f0=0.05"}}}},
     {"brushed metal", {{"ward", {"ks=0.5,0.4,0.3", "ax=0.08", "ay=0.33"}}, {"lambert", {"rho=0.05"}}}, false},
+    {"cloth with fibres that stand off it",
+     {{"lambert", {"rho=0.2,0.05,0.05"}}, {"charlie", {"r=0.17", "tint=0.5,0.3,0.3"}}}},
+    {"plastic: less matte light leaves it where its coat reflects more",
+     {{"ashikhmin_shirley", {"part=diffuse", "rs=0", "rd=0.5,0.4,0.1"}}, {"blinn", {"ks=0.2", "e=130"}}}},
 };
 
 TEST(FitLobes, KnownSumsAreFound) {
