@@ -28,8 +28,8 @@ constexpr int kLeastSearches = 2, kMostSearches = 8;
 constexpr double kFirstStep = 0.06, kStepFalls = 0.5, kSearchOn = 0.97;
 /// Another lobe must make the error at least so many times smaller; so must one that takes a lobe's place.
 constexpr double kWorthLobe = 0.995, kWorthExchange = 0.99;
-/// Where the error is larger, lobes are searched for anew, without the model of the strongest highlight: one that was
-/// taken early may stand for two others so well that no single exchange leads to them.
+/// Where the error is larger, lobes are searched for anew, without the model of the strongest highlight: an early lobe
+/// may approximate two others so well that no single exchange improves the sum.
 constexpr double kSearchAnew = 0.005;
 /// A lobe that not every device renders must be so much better than others.
 constexpr double kEverywhere = 0.95;
@@ -432,11 +432,18 @@ std::vector<LobeSum> better(std::vector<LobeSum> a, std::vector<LobeSum> b) {
   return out;
 }
 
-/// The model whose lobes reflect most of a sum's light and have numbers that can be searched.
+/// Whether a lobe has the choices of a kind.
+bool is_of(const Lobe& lobe, const LobeKind& kind) {
+  return lobe.model == kind.model && std::ranges::all_of(kind.values, [&](const auto& v) {
+           return !std::holds_alternative<std::string>(v.second) || lobe.values.at(v.first) == v.second;
+         });
+}
+
+/// The model of the lobe that reflects most of a sum's light among those that are not matte.
 const Model* strongest_highlight(const LobeSum& sum, const std::vector<LobeKind>& kinds) {
   for (const Lobe& lobe : sum.lobes)
     for (const LobeKind& kind : kinds)
-      if (kind.model == lobe.model && !kind.numbers.empty()) return lobe.model;
+      if (is_of(lobe, kind) && !kind.numbers.empty() && lobe.model->info().look != Look::Matte) return lobe.model;
   return nullptr;
 }
 

@@ -16,7 +16,6 @@ class HalfVectors final : public Sampler {
   HalfVectors(const Table&, bool isotropic);
   double pdf(const Vec3<double>& wi, const Vec3<double>& wo) const override;
   Sample<double> sample(const Vec3<double>& wo, const Vec3<double>& u) const override;
-  double matte_share() const { return matte_; }
 
  private:
   double facet_pdf(const Vec3<double>& h) const;

@@ -111,7 +111,7 @@ std::vector<LobeKind> lobe_kinds(const std::vector<std::string>& names, bool iso
     if (std::ranges::none_of(rows(), [&](const KindRow& row) { return row.model == name; })) {
       std::vector<std::string> known;
       for (const KindRow& row : rows())
-        if (known.empty() || known.back() != row.model) known.emplace_back(row.model);
+        if (std::ranges::find(known, row.model) == known.end()) known.emplace_back(row.model);
       input_error("{} has no lobe for a sum, expected all or some of {}", name, join(known, ", "));
     }
   }

@@ -9,8 +9,8 @@
 #include <functional>
 
 #include "core/error.h"
-#include "core/process.h"
 #include "core/text.h"
+#include "core/write_beside.h"
 #include "pictures/pictures.h"
 #include "reference/color.h"
 
@@ -262,24 +262,6 @@ std::string ending(const fs::path& path) {
   std::string text = path.extension().string();
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return char(std::tolower(c)); });
   return text;
-}
-
-void write_beside(const fs::path& path, const std::function<void(const fs::path&)>& write) {
-  std::error_code error;
-  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
-  fs::create_directories(folder, error);
-  if (error || !fs::is_directory(folder)) input_error("{}: can't create this folder", folder.string());
-  if (fs::is_directory(path)) input_error("{}: is a folder, expected a file name", path.string());
-  const fs::path temporary =
-      folder / fmt::format(".{}.{}{}", path.stem().string(), process_id(), path.extension().string());
-  try {
-    write(temporary);
-    fs::rename(temporary, path, error);
-    if (error) input_error("{}: can't write ({})", path.string(), error.message());
-  } catch (...) {
-    fs::remove(temporary, error);
-    throw;
-  }
 }
 
 Rendering read_rendering(const fs::path& path) {

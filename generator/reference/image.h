@@ -42,10 +42,6 @@ struct Rendering {
 /// The file's extension in lower case, with its dot.
 std::string ending(const std::filesystem::path& path);
 
-/// Calls write() with a temporary name beside `path` that has the same extension, then renames the file to `path`, so
-/// that no half-written file is visible. Creates missing folders. Throws InputError if `path` can't be written.
-void write_beside(const std::filesystem::path& path, const std::function<void(const std::filesystem::path&)>& write);
-
 /// Reads a rendering: the channels R, G, B, without a layer or of the first layer that has them, such as Blender's
 /// "Combined"; the channels "variance.R/G/B" if present; and the working space, if the attribute colorInteropID or,
 /// without it, the attribute chromaticities gives it. Throws InputError that names the file, also if the attribute

@@ -10,7 +10,7 @@
 
 #include "core/error.h"
 #include "core/parse.h"
-#include "reference/image.h"
+#include "core/write_beside.h"
 
 namespace brdfc::reference {
 

@@ -363,7 +363,12 @@ BRDFC_VECTORISED void PathTracer::choose(const Surface& surface, const PackedBrd
     path.sampled = nullptr;
     if (const double u = delta_chance > 0 ? path.random.one(dimension_of(bounce)) : 1; u < delta_chance) {
       const Color reflected = lane(mirror, k), refracted = lane(transmit, k);
-      const double share = luminance(reflected) / luminance(reflected + refracted);
+      const double all = luminance(reflected + refracted);
+      if (!(all > 0)) {  // of black glass
+        on[at] = false;
+        continue;
+      }
+      const double share = luminance(reflected) / all;
       if (u < delta_chance * share) {
         wi = {-out.x, -out.y, out.z};
         throughput = throughput * reflected / (delta_chance * share);

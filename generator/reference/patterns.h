@@ -68,7 +68,6 @@ class PathSampler {
     if (in_pattern_) pattern_key_ = pattern_key(seed, pixel);
   }
 
-  bool in_pattern() const { return in_pattern_; }
   /// The key for Random::at(). The first number of a dimension has index first(), the second the next index.
   std::uint64_t random_key() const { return random_key_; }
   static constexpr std::uint64_t first(std::uint64_t dimension) { return 2 * dimension; }

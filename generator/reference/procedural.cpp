@@ -104,10 +104,6 @@ Radiance radiance_named(const std::string& name) {
 
 }  // namespace
 
-Rgb<double> procedural_radiance(const std::string& name, const Vec3<double>& direction) {
-  return radiance_named(name)(direction);
-}
-
 Image procedural_environment(const std::string& name, int width) {
   const Radiance radiance = radiance_named(name);
   Image image(width, width / 2);

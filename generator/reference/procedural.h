@@ -15,10 +15,8 @@ inline void direction_to_equirectangular(const Vec3<double>& d, double& u, doubl
 }
 Vec3<double> equirectangular_to_direction(double u, double v);
 
-/// Radiance of the environment with this name, in a direction: "sky", "interior" or "checker".
-Rgb<double> procedural_radiance(const std::string& name, const Vec3<double>& direction);
-
-/// The same environment as an equirectangular picture of `width` x `width / 2`, with 16 samples per texel.
+/// The environment with this name, "sky", "interior" or "checker", as an equirectangular picture of `width` x `width /
+/// 2`, with 16 samples per texel.
 Image procedural_environment(const std::string& name, int width);
 
 /// A checkerboard of two colours, with `cells` along each side of the unit square of uv and 16 texels per cell.

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "core/json_text.h"
+#include "core/write_beside.h"
 #include "reference/json_view.h"
 #include "reference/procedural.h"
 #include "reference/scene_files.h"

@@ -14,6 +14,7 @@
 
 #include "core/json_text.h"
 #include "core/parallel.h"
+#include "core/write_beside.h"
 #include "measure/probes.h"
 #include "model/model.h"
 #include "pictures/pictures.h"
@@ -242,11 +243,12 @@ void write_stability_maps(const std::string& dir, std::span<const Model* const> 
                                    {"colors", colors},
                                    {"printed", printed},
                                    {"models", of_models}};
-  const std::string path = dir + "/maps.json";
-  std::ofstream file(path);
-  file << json_text(out, 2) << "\n";
-  file.close();
-  if (!file) throw InputError(fmt::format("{}: expected a place that can be written", path));
+  write_beside(dir + "/maps.json", [&](const std::filesystem::path& temporary) {
+    std::ofstream file(temporary);
+    file << json_text(out, 2) << "\n";
+    file.close();
+    if (!file) input_error("{}/maps.json: expected a place that can be written", dir);
+  });
 }
 
 }  // namespace brdfc::report

@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "core/json_text.h"
 #include "core/text.h"
+#include "core/write_beside.h"
 #include "reference/image.h"
 #include "report/report.h"
 #include "report/verdict.h"
@@ -86,7 +87,7 @@ std::string csv_field(const std::string& text) {
 }
 
 void write_text(const fs::path& file, const std::string& text) {
-  reference::write_beside(file, [&](const fs::path& temporary) {
+  write_beside(file, [&](const fs::path& temporary) {
     std::ofstream out(temporary, std::ios::binary);
     out << text;
     out.close();

@@ -9,7 +9,7 @@
 
 #include "core/data_dir.h"
 #include "core/hash.h"
-#include "core/process.h"
+#include "core/write_beside.h"
 
 namespace brdfc::inline tables {
 namespace {
@@ -64,17 +64,13 @@ std::optional<fs::path> cache(const StoreKey& key, const std::function<void(cons
   const std::optional<fs::path> path = key.cached_path();
   if (!path) return std::nullopt;
   const fs::path folder = path->parent_path();
-  const fs::path beside = folder / fmt::format(".{}.{}.exr", path->stem().string(), process_id());
-  std::error_code error;
   try {
-    fs::create_directories(folder, error);
-    write(beside);
-    fs::rename(beside, *path);
+    write_beside(*path, write);
   } catch (const std::exception& e) {
     fmt::print(stderr, "brdfc: it is not kept for the next time: {}\n", e.what());
-    fs::remove(beside, error);
     return std::nullopt;
   }
+  std::error_code error;
   std::vector<std::pair<fs::file_time_type, fs::path>> kept;
   for (const fs::path& file : files_of(folder, key.model())) {
     const fs::file_time_type used = fs::last_write_time(file, error);

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "core/write_beside.h"
 #include "pictures/pictures.h"
 
 namespace brdfc::inline tables {
@@ -49,15 +50,10 @@ void write_table_image(const TableImage& image, const std::filesystem::path& pat
   header.channels.resize(std::size_t(image.channels));
   // OpenImageIO writes the present time unless one is set.
   header.attributes = {{kMeta, image.meta}, {"compression", "zip"}, {"DateTime", "1980:01:01 00:00:00"}};
-  const std::string beside = path.string() + ".part.exr";
-  if (const auto failed = pictures::write(beside, header, image.pixels)) {
-    std::error_code ignored;
-    std::filesystem::remove(beside, ignored);
-    input_error("{}: cannot be written: {}", path.string(), failed->reason);
-  }
-  std::error_code error;
-  std::filesystem::rename(beside, path, error);
-  if (error) input_error("{}: cannot be written: {}", path.string(), error.message());
+  write_beside(path, [&](const std::filesystem::path& temporary) {
+    if (const auto failed = pictures::write(temporary, header, image.pixels))
+      input_error("{}: cannot be written: {}", path.string(), failed->reason);
+  });
 }
 
 TableImage read_table_image(const std::filesystem::path& path) {

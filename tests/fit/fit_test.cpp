@@ -642,7 +642,7 @@ TEST(Fit, TablesCanBeLookedAt) {
   }
   EXPECT_EQ(numbers, fit.size());
   EXPECT_EQ(meta.at("tables").size(), std::size_t(image.height));
-  EXPECT_THROW(fit.store(m, values, folder.path() / "absent" / "fit.exr"), InputError);
+  EXPECT_THROW(fit.store(m, values, "/dev/null/fit.exr"), InputError);
 }
 
 TEST(StoredFits, AreWholeOrRefused) {

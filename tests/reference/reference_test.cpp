@@ -10,6 +10,7 @@
 #include <fstream>
 #include <memory>
 
+#include "core/write_beside.h"
 #include "reference/color.h"
 #include "reference/lights.h"
 #include "reference/procedural.h"
