@@ -379,8 +379,9 @@ class Aimed final : public OslForm {
   std::vector<Recording> recordings(const Model& model, const ParamValues& values,
                                     const Setting& setting) const override {
     const AimedRecording r = record_aimed(model, values, setting.base, setting.views);
-    const AimedSteps& s = aimed_steps();
-    return {r.base, r.draw, r.value, s.beam, s.room, s.aim, s.cut, s.emphasis, s.less, s.send, s.rest};
+    std::vector<Recording> out = aimed_steps().all();
+    out.insert(out.end(), {r.base, r.draw, r.value});
+    return out;
   }
 
  protected:

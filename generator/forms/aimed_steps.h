@@ -2,6 +2,8 @@
 // Recorded programs for the lamps of an aimed form.
 #pragma once
 
+#include <vector>
+
 #include "forms/recording.h"
 
 namespace brdfc::forms {
@@ -27,6 +29,10 @@ struct AimedSteps {
   Recording meet;   ///< adds an earlier lobe to covered, covered_before, lamp_met and density_under; moves ray_*
   Recording rest;   ///< reads excess, drawn_density, lobes and the results of meet; assigns rest_weight and rest_colour
   Recording alone;  ///< rest without lamps: reads excess and drawn_density
+
+  std::vector<Recording> all() const {
+    return {beam, above, room, aim, low, cut, emphasis, less, send, toss, under, meet, rest, alone};
+  }
 };
 const AimedSteps& aimed_steps();
 
