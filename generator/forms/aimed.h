@@ -194,7 +194,8 @@ template <class T> Seen<T> seen(const Vec3<T>& point, const Vec3<T>& normal, con
 /// v2: numbers in [0, 1) that choose a point of `shining`.
 template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const LampPatch<T>& shining, const T& room,
                                        const T& v1, const T& v2, const Vec3<T>& wo) {
-  /// Sine of the angular radius above which the lamp is left to the rest: drawn directions hit it often enough.
+  /// The radius in units of the distance above which the lamp is left to the rest: drawn directions hit it often
+  /// enough.
   constexpr double kNearest = 0.85;
   /// Lower bounds for the cosine between the closure's normal and any point of the lamp. Below the first, the normal is
   /// dominated by rounding; below the second, a fraction of the cosine to the lamp's centre, the closure is almost
