@@ -211,24 +211,23 @@ class AimedLamps {
         assign("lamp_across", in_frame("across_here")),
         assign("lamp_along", in_frame("along_here")),
         assign("lamp_disk", "disk_here"),
-        Declare{"vector",
-                {{"shining_centre", {"lamp_centre"}},
-                 {"shining_across", {"lamp_across"}},
-                 {"shining_along", {"lamp_along"}}}},
-        declare("float", "shining_disk", "disk_here"),
-    };
-    Statements lit = {
         declare("vector", "beam", in_frame("beam_here")),
+        Declare{"vector",
+                {{"full_centre", {"lamp_centre"}}, {"full_across", {"lamp_across"}}, {"full_along", {"lamp_along"}}}},
+        declare("float", "full_disk", "disk_here"),
+    };
+    const Value has_beam = print::all_of({"any_beam", operation("beam_edge", ">", 0.0)});
+    Statements lit = {
         declare_all("vector", {"lit_centre", "lit_across", "lit_along"}),
         declare("float", "lit_disk"),
-        run(steps_.beam),
+        run(steps_.bounds),
     };
     for (const std::string what : {"centre", "across", "along", "disk"})
       lit.push_back(assign("lamp_" + what, "lit_" + what));
     // Bump Map Correction bends the normals of lobes downwards. From Blender 5.0 on, Cycles evaluates no lobe in
     // directions below the interpolated normal.
     append(out, {
-                    If{print::all_of({"any_beam", operation("beam_edge", ">", 0.0)}), lit},
+                    If{has_beam, lit},
                     declare("vector", "to_centre", call("normalize", {"lamp_centre"})),
                     assign("to_centre", in_scene_of("to_centre")),
                     If{print::any_of({operation(call("dot", {"N", "to_centre"}), "<=", 0.0),
@@ -243,20 +242,25 @@ class AimedLamps {
            {
                Comment{"Numbers of its own: what a lobe gives at another's lamp must not go with where that is met."},
                declare("vector", "v_all", call("brdfc_random", {Value(1) + "lamp", "path_length"})),
-               Declare{"float", {{"v_1", {element("v_all", 0)}}, {"v_2", {element("v_all", 1)}}}},
+               Declare{"float",
+                       {{"v_1", {element("v_all", 0)}},
+                        {"v_2", {element("v_all", 1)}},
+                        {"v_3", {element("v_all", 2)}},
+                        {"lamp_low"},
+                        {"lamp_cut", {0.0}}}},
                If{"several", {earlier_lobes({"towards", "radius"}, {run(steps_.room)})}},
                declare_all("float", {"to_lamp_x", "to_lamp_y", "to_lamp_z", "to_half_x", "to_half_y", "to_half_z"}),
                run(steps_.aim),
                none_left,
                assign("lobe_towards", vector_of("to_lamp")),
                assign("lobe_half", vector_of("to_half")),
-               declare("float", "lamp_low"),
                Block{{run(steps_.low)}},
                If{print::all_of({operation("lamp_low", "<", 0.0),
                                  operation(call("brdfc_cuts_off", {"shape_here", "centre_here", "across_here",
                                                                    "along_here", "disk_here"}),
                                            "!=", 0)}),
-                  {run(steps_.cut), none_left}},
+                  {assign("lamp_cut", 1.0), run(steps_.cut), none_left}},
+               If{has_beam, {run(steps_.lit), none_left}},
                Block{{run(steps_.emphasis)}},
                If{operation("lamp_emphasis", "==", 0.0), {Continue{}}},
                Comment{"Drawn directions do not meet it, or are not to: see brdfc_lamp()."},

@@ -13,7 +13,7 @@
 // wider than its lamp; the rest subtracts what it gives beside the lamp. Some directions are drawn from the aimed lobes
 // for that purpose, because the model's own samples are rare where the model falls off steeply. There is one
 // approximation: f and the light that arrives from a lamp are averaged separately over the lamp. For a lamp with a
-// light cone, f is averaged only over the part that shines on this point (lit_part()); occlusion is not taken into
+// light cone, f is averaged in proportion to the light that arrives here (lit_point()); occlusion is not taken into
 // account.
 //
 // Directions and lamps are in the local frame of the shader: z is the normal on the viewer's side.
@@ -190,10 +190,10 @@ template <class T> Seen<T> seen(const Vec3<T>& point, const Vec3<T>& normal, con
   return {abs(dot(normal, point)) * (nearness * nearness * nearness), dot(axis, point) * nearness};
 }
 
-/// Aims a closure at a lamp. `shining`: the mean of its lit_part(), or the lamp itself. `room`: see room_beside(). v1,
-/// v2: numbers in [0, 1) that choose a point of `shining`.
-template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const LampPatch<T>& shining, const T& room,
-                                       const T& v1, const T& v2, const Vec3<T>& wo) {
+/// Aims a closure at a lamp, or at the lit_bounds() of one. `room`: see room_beside(). v1, v2: numbers in [0, 1) that
+/// choose a point of it.
+template <class T>
+AimedLamp<T> aim_at(const LampPatch<T>& patch, const T& room, const T& v1, const T& v2, const Vec3<T>& wo) {
   /// The radius in units of the distance above which the lamp is left to the rest: drawn directions hit it often
   /// enough.
   constexpr double kNearest = 0.85;
@@ -212,28 +212,27 @@ template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const LampPatc
   lamp.height = T(2) * pi<T>() / (rise * (lamp.lobe.exponent + T(2)));
 
   const T radius = sqrt(v1), angle = T(2) * pi<T>() * v2;
-  const auto round = shining.disk > T(0.5);
-  const Vec3<T> point = shining.at(select(round, radius * cos(angle), T(2) * v1 - T(1)),
-                                   select(round, radius * sin(angle), T(2) * v2 - T(1)));
+  const Vec3<T> point = patch.at(select(disk, radius * cos(angle), T(2) * v1 - T(1)),
+                                 select(disk, radius * sin(angle), T(2) * v2 - T(1)));
   lamp.wi = unit(point);
   // Its length is the lamp's area divided by 4 or pi.
   const Vec3<T> normal = cross(patch.across, patch.along);
-  // Means over the shining part by nine points, exact to degree 5: for a rectangle, three Gauss points on each axis;
+  // Means over the lamp by nine points, exact to degree 5: for a rectangle, three Gauss points on each axis;
   // for a disk, its centre and eight points of a circle (A. Stroud: Approximate Calculation of Multiple Integrals,
   // 1971). Over random lamps with an angular radius of 30 to 45 degrees, the light is off by 0.15 % (rectangles) and
   // 0.19 % (disks), root mean square; by four points, exact to degree 3, it was 1.5 and 2.1 %. Each of the eight outer
   // points is the one before it, turned by 45 degrees; those of a rectangle are on its sides and in its corners in
   // turn. State of the loop: the point, the factor that leads to the next one, its weight, and the two sums.
-  const auto of = [&](double disk, double rectangle) { return select(round, T(disk), T(rectangle)); };
+  const auto of = [&](double of_disk, double of_rectangle) { return select(disk, T(of_disk), T(of_rectangle)); };
   const T lengths = of(std::sqrt(2.0), 1.5), weights = of(3.0 / 16, 65.0 / 324);
   const T first = of(std::sqrt(2.0 / 3), std::sqrt(0.6)), of_centre = of(1.0 / 4, 16.0 / 81);
-  const Seen<T> middle = seen(shining.centre, normal, lamp.lobe.half);
+  const Seen<T> middle = seen(patch.centre, normal, lamp.lobe.half);
   const std::array<T, 6> means =
       iterate(8,
               std::array<T, 6>{first, T(0), of(std::sqrt(0.5), 1), of(3.0 / 32, 10.0 / 81), of_centre * middle.density,
                                of_centre * middle.density * middle.cosine},
               [&](const std::array<T, 6>& s) {
-                const Seen<T> at = seen(shining.at(s[0], s[1]), normal, lamp.lobe.half);
+                const Seen<T> at = seen(patch.at(s[0], s[1]), normal, lamp.lobe.half);
                 const T part = s[3] * at.density;
                 return std::array<T, 6>{(s[0] - s[1]) * s[2], (s[0] + s[1]) * s[2], lengths - s[2],
                                         weights - s[3],       s[4] + part,          s[5] + part * at.cosine};
@@ -241,8 +240,8 @@ template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const LampPatc
   lamp.solid_angle = select(disk, pi<T>(), T(4)) * means[4];
   const T sinRadius = lamp.lobe.sinRadius;
   const T least_rise = rise * sqrt(T(1) - sqr(sinRadius)) - sqrt(maximum(T(1) - sqr(rise), T(0))) * sinRadius;
-  const auto usable = radius2 < T(kNearest * kNearest) * distance2 && dot(shining.across, shining.across) > T(0) &&
-                      least_rise > maximum(T(kLeastRise), T(kLeastShare) * rise);
+  const auto usable =
+      radius2 < T(kNearest * kNearest) * distance2 && least_rise > maximum(T(kLeastRise), T(kLeastShare) * rise);
   lamp.density = seen(point, normal, lamp.lobe.half).density;
   lamp.mean_rise = select(usable, means[5], T(0));
   return lamp;
@@ -252,10 +251,10 @@ template <class T> AimedLamp<T> aim_at(const LampPatch<T>& patch, const LampPatc
 /// part above. From Blender 5.0 on, Cycles evaluates closures that have their own normal as black below the smooth
 /// normal (docs/cycles.md). v1, v2: as for aim_at().
 template <class T>
-AimedLamp<T> cut_off(AimedLamp<T> lamp, const LampPatch<T>& shining, const Vec3<T>& normal, const T& v1, const T& v2) {
+AimedLamp<T> cut_off(AimedLamp<T> lamp, const LampPatch<T>& patch, const Vec3<T>& normal, const T& v1, const T& v2) {
   constexpr int kSteps = 6;
-  const PartAbove<T> part(shining, normal);
-  const Vec3<T> axis = cross(shining.across, shining.along);
+  const PartAbove<T> part(patch, normal);
+  const Vec3<T> axis = cross(patch.across, patch.along);
   // Integrates solid angle and cosine over the part: midpoint rule along u, three-point Gauss rule along v. The last
   // turn of the loop is the chosen point, so that the text has one copy of part.at(): copies take long to compile.
   // State of the loop: u, v, the sum, and a point and its density.
@@ -282,6 +281,14 @@ AimedLamp<T> cut_off(AimedLamp<T> lamp, const LampPatch<T>& shining, const Vec3<
   // If the lobe's normal lies below the plane, the lobe is black everywhere above it.
   const auto shows = lamp.mean_rise > T(0) && dot(lamp.lobe.half, normal) > T(0);
   lamp.mean_rise = select(shows, mean_rise, T(0));
+  return lamp;
+}
+
+/// Restricts a lamp to what shines of it: the point becomes a lit_point().
+template <class T> AimedLamp<T> lit(AimedLamp<T> lamp, const LitPoint<T>& point) {
+  lamp.wi = point.wi;
+  lamp.density = T(1);
+  lamp.mean_rise = select(lamp.mean_rise > T(0), point.rise, T(0));
   return lamp;
 }
 
@@ -435,10 +442,11 @@ struct AimedSum {
 };
 
 /// The computation of the shader (aimed.cpp) in double precision, with the base for wo. u: three numbers that draw the
-/// direction. v: two independent numbers per lamp that choose a point of it. `beams`: empty, or one per lamp, with edge
-/// 0 if the lamp shines in all directions. `horizon`: normal of the plane below which lobes are cut_off(), if they are.
+/// direction. v: three independent numbers per lamp that choose a point of it. `beams`: empty, or one per lamp, with
+/// edge 0 if the lamp shines in all directions. `horizon`: normal of the plane below which lobes are cut_off(), if they
+/// are.
 AimedSum aimed_sum(const Brdf<double>&, const ClosureSum<double>& base, const std::vector<LampPatch<double>>&,
-                   const Vec3<double>& wo, const Vec3<double>& u, const std::vector<std::array<double, 2>>& v,
+                   const Vec3<double>& wo, const Vec3<double>& u, const std::vector<std::array<double, 3>>& v,
                    const std::vector<LampBeam<double>>& beams = {}, const std::optional<Vec3<double>>& horizon = {});
 
 }  // namespace brdfc::forms

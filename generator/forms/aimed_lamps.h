@@ -101,62 +101,76 @@ template <class T> struct LampBeam {
   }
 };
 
-/// The part of a lamp with a light cone that shines on the shading point.
-template <class T> struct LitPart {
-  LampPatch<T>
-      lamp;  ///< bounds of the part that may shine here; the rest of the lamp is treated like any other direction
-  /// The rectangle or, for a disk, the ellipse that f is averaged over: it has the same centre and variances as the
-  /// light. With half axes of 0 the lamp does not shine here.
-  LampPatch<T> mean;
-};
-template <class T> LitPart<T> lit_part(const LampPatch<T>& patch, const LampBeam<T>& beam) {
-  constexpr int kSteps = 5;
-  const T a = length(patch.across), b = length(patch.along);
-  const Vec3<T> n = divided(cross(patch.across, patch.along), a * b);
-  const T slant = dot(n, beam.axis), reach = dot(n, patch.centre) / select(abs(slant) > T(0.01), slant, T(0.01));
-  const Vec3<T> middle = beam.axis * reach - patch.centre;
+/// x / y for y > 0, otherwise 0.
+template <class T> T divided_or_zero(const T& x, const T& y) {
+  return select(y > T(0), x / maximum(y, tiny<T>()), T(0));
+}
+
+/// Bounds of the part of a lamp with a light cone that may shine on the shading point. The rest of the lamp is treated
+/// like any other direction.
+template <class T> LampPatch<T> lit_bounds(const LampPatch<T>& whole, const LampBeam<T>& beam) {
+  const T a = length(whole.across), b = length(whole.along);
+  const Vec3<T> n = divided(cross(whole.across, whole.along), a * b);
+  const T slant = dot(n, beam.axis), reach = dot(n, whole.centre) / select(abs(slant) > T(0.01), slant, T(0.01));
+  const Vec3<T> middle = beam.axis * reach - whole.centre;
   // The cone meets the lamp's plane within a circle about its axis. The circle is larger if the axis is oblique.
   const T sine = sqrt(maximum(T(1) - sqr(beam.edge), T(0)));
   const T tilt = sqrt(maximum(T(1) - sqr(slant), T(0)));
   const T radius = abs(reach) * sine / maximum(abs(slant) * beam.edge - tilt * sine, T(0.01));
+  struct Range {
+    T middle, half;
+  };
   const auto range = [&](const T& at, const T& half) {
     const auto within = [](const T& x) { return minimum(maximum(x, T(-1)), T(1)); };
-    return std::array<T, 2>{within((at - radius) / half), within((at + radius) / half)};
+    const T low = within((at - radius) / half), high = within((at + radius) / half);
+    return Range{(low + high) / T(2), (high - low) / T(2)};
   };
-  const std::array<T, 2> xs = range(dot(middle, patch.across) / a, a), ys = range(dot(middle, patch.along) / b, b);
-  const T step_x = (xs[1] - xs[0]) / T(kSteps), step_y = (ys[1] - ys[0]) / T(kSteps);
-  const T first_x = xs[0] + step_x / T(2);
-  // State of the loop: x, y, and the sums of light, light x, light y, light x^2, light y^2.
-  const std::array<T, 7> sums =
-      iterate(kSteps * kSteps, std::array<T, 7>{first_x, ys[0] + step_y / T(2), T(0), T(0), T(0), T(0), T(0)},
-              [&](const std::array<T, 7>& s) {
-                const auto on = patch.disk < T(0.5) || sqr(s[0]) + sqr(s[1]) < T(1);
-                const T light = select(on, beam(normalize(patch.at(s[0], s[1]))), T(0));
-                const T next = s[0] + step_x;
-                const auto turns = next > xs[1];
-                return std::array<T, 7>{select(turns, first_x, next),
-                                        select(turns, s[1] + step_y, s[1]),
-                                        s[2] + light,
-                                        s[3] + light * s[0],
-                                        s[4] + light * s[1],
-                                        s[5] + light * sqr(s[0]),
-                                        s[6] + light * sqr(s[1])};
+  const Range x = range(dot(middle, whole.across) / a, a), y = range(dot(middle, whole.along) / b, b);
+  const auto is_whole = x.half + y.half >= T(2);
+  return {whole.at(x.middle, y.middle), whole.across * x.half, whole.along * y.half,
+          select(is_whole, whole.disk, T(0))};
+}
+
+/// A point of a lamp with a light cone.
+template <class T> struct LitPoint {
+  Vec3<T> wi;  ///< unit vector to it
+  T rise;      ///< mean cosine between the light and `half`; 0 if the lamp does not shine here
+};
+/// Chooses a point in proportion to the light that arrives from there, by resampling: J. Talbot, D. Cline, P. Egbert:
+/// Importance Resampling for Global Illumination, Eurographics Symposium on Rendering 2005. The candidates are a grid
+/// over the bounds with a random offset. `cut`: above 0.5 if nothing counts that is below the plane of `horizon`. v1,
+/// v2, v3: numbers in [0, 1).
+template <class T> LitPoint<T> lit_point(const LampPatch<T>& bounds, const LampPatch<T>& whole, const LampBeam<T>& beam,
+                                         const Vec3<T>& half, const Vec3<T>& horizon, const T& cut, const T& v1,
+                                         const T& v2, const T& v3) {
+  constexpr int kSteps = 6;
+  const Vec3<T> normal = cross(bounds.across, bounds.along);
+  const T a2 = dot(whole.across, whole.across), b2 = dot(whole.along, whole.along), step = T(2.0 / kSteps);
+  const T first = v1 * step - T(1);
+  // State of the loop: the place in the bounds, the sum of the weights, that of weights times cosines, what is left of
+  // the number that chooses, and the chosen direction.
+  const std::array<T, 8> chosen =
+      iterate(kSteps * kSteps, std::array<T, 8>{first, v2 * step - T(1), T(0), T(0), v3, T(0), T(0), T(0)},
+              [&](const std::array<T, 8>& s) {
+                const Vec3<T> at = bounds.at(s[0], s[1]), beside = at - whole.centre;
+                const T nearness = T(1) / length(at);
+                const Vec3<T> wi = at * nearness;
+                const auto on = whole.disk < T(0.5) ||
+                                sqr(dot(beside, whole.across) / a2) + sqr(dot(beside, whole.along) / b2) < T(1);
+                const auto counts = on && (cut < T(0.5) || dot(wi, horizon) > T(0));
+                const T solid_angle = abs(dot(normal, wi)) * sqr(nearness);
+                const T weight = select(counts, beam(wi) * solid_angle, T(0)), sum = s[2] + weight;
+                const T number = s[4] * sum;
+                const auto takes = number < weight;
+                const T left = divided_or_zero(select(takes, number, number - weight), select(takes, weight, s[2]));
+                const T next = s[0] + step;
+                const auto turns = next > first + T(2 - 1.0 / kSteps);
+                return std::array<T, 8>{
+                    select(turns, first, next),    select(turns, s[1] + step, s[1]),  sum,
+                    s[3] + weight * dot(half, wi), select(weight > T(0), left, s[4]), select(takes, wi.x, s[5]),
+                    select(takes, wi.y, s[6]),     select(takes, wi.z, s[7])};
               });
-  const auto lit = sums[2] > T(0);
-  const T all = select(lit, sums[2], T(1)), x = sums[3] / all, y = sums[4] / all;
-  // Each sample stands for a grid cell, whose own variance is a twelfth of its squared width. The squared half axis is
-  // three times the variance over a rectangle, and four times that over an ellipse. A rectangle of the variances of a
-  // disk would have corners outside of it, and of a lobe that is narrow for other lamps.
-  const T times = select(patch.disk > T(0.5), T(4), T(3));
-  const auto half = [&](const T& square, const T& mean, const T& step) {
-    return select(lit, sqrt(times * (maximum(square / all - sqr(mean), T(0)) + sqr(step) / T(12))), T(0));
-  };
-  const T half_x = (xs[1] - xs[0]) / T(2), half_y = (ys[1] - ys[0]) / T(2);
-  const auto whole = half_x + half_y >= T(2);
-  return {
-      {patch.at((xs[0] + xs[1]) / T(2), (ys[0] + ys[1]) / T(2)), patch.across * half_x, patch.along * half_y,
-       select(whole, patch.disk, T(0))},
-      {patch.at(x, y), patch.across * half(sums[5], x, step_x), patch.along * half(sums[6], y, step_y), patch.disk}};
+  return {{chosen[5], chosen[6], chosen[7]}, divided_or_zero(chosen[3], chosen[2])};
 }
 
 }  // namespace brdfc::forms

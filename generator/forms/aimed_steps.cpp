@@ -42,22 +42,19 @@ AimedSteps record_steps() {
   };
   const AimedLobe<Expr> earlier = lobe_named("earlier");
   const LampPatch<Expr> patch = patch_named("lamp");
-  const LampPatch<Expr> shining = patch_named("shining");
   const Expr lobes = Expr::input("lobes");
-  steps.beam = record_step([&](Program& p) {
-    const LampBeam<Expr> beam{input_vector("beam"), Expr::input("beam_edge"), Expr::input("beam_blend")};
-    const LitPart<Expr> lit = lit_part(patch, beam);
+  const LampBeam<Expr> beam{input_vector("beam"), Expr::input("beam_edge"), Expr::input("beam_blend")};
+  steps.bounds = record_step([&](Program& p) {
+    const LampPatch<Expr> bounds = lit_bounds(patch, beam);
     const auto output_vector = [&](const std::string& name, const Vec3<Expr>& v) {
       p.output(name + "[0]", v.x);
       p.output(name + "[1]", v.y);
       p.output(name + "[2]", v.z);
     };
-    for (const auto& [name, part] : {std::pair<std::string, LampPatch<Expr>>{"shining", lit.mean}, {"lit", lit.lamp}}) {
-      output_vector(name + "_centre", part.centre);
-      output_vector(name + "_across", part.across);
-      output_vector(name + "_along", part.along);
-      p.output(name + "_disk", part.disk);
-    }
+    output_vector("lit_centre", bounds.centre);
+    output_vector("lit_across", bounds.across);
+    output_vector("lit_along", bounds.along);
+    p.output("lit_disk", bounds.disk);
   });
   steps.above = record_step([&](Program& p) { p.output("lamp_above", highest(patch)); });
   steps.room = record_step([&](Program& p) {
@@ -65,7 +62,7 @@ AimedSteps record_steps() {
   });
   steps.aim = record_step([&](Program& p) {
     const AimedLamp<Expr> lamp =
-        aim_at(patch, shining, Expr::input("lobe_room"), Expr::input("v_1"), Expr::input("v_2"), input3("wo"));
+        aim_at(patch, Expr::input("lobe_room"), Expr::input("v_1"), Expr::input("v_2"), input3("wo"));
     p.output("wi", lamp.wi);
     p.output("to_lamp", lamp.lobe.towards);
     p.output("to_half", lamp.lobe.half);
@@ -85,10 +82,20 @@ AimedSteps record_steps() {
     AimedLamp<Expr> lamp;
     lamp.lobe = lobe_named("lobe");
     lamp.mean_rise = Expr::input("lamp_rise");
-    const AimedLamp<Expr> cut = cut_off(lamp, shining, horizon, Expr::input("v_1"), Expr::input("v_2"));
+    const AimedLamp<Expr> cut = cut_off(lamp, patch, horizon, Expr::input("v_1"), Expr::input("v_2"));
     p.output("wi", cut.wi);
     p.output("lamp_density", cut.density);
     p.output("lamp_rise", cut.mean_rise);
+  });
+  steps.lit = record_step([&](Program& p) {
+    AimedLamp<Expr> lamp;
+    lamp.mean_rise = Expr::input("lamp_rise");
+    const AimedLamp<Expr> shown =
+        lit(lamp, lit_point(patch, patch_named("full"), beam, lobe_named("lobe").half, horizon, Expr::input("lamp_cut"),
+                            Expr::input("v_1"), Expr::input("v_2"), Expr::input("v_3")));
+    p.output("wi", shown.wi);
+    p.output("lamp_density", shown.density);
+    p.output("lamp_rise", shown.mean_rise);
   });
   steps.emphasis = record_step([&](Program& p) {
     AimedLamp<Expr> lamp;

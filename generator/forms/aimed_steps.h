@@ -12,15 +12,16 @@ namespace brdfc::forms {
 /// so far. lamp_* and lobe_* are the numbers of the current lamp and its lobe, earlier_* those of an earlier lamp and
 /// its lobe, and chosen_* those of the lobe that a direction is drawn from.
 struct AimedSteps {
-  Recording beam;   ///< reads the lamp and beam*; assigns shining_* (the part to average f over) and lit_* (which
-                    ///< replaces the lamp)
-  Recording above;  ///< reads the lamp; assigns lamp_above, the height of its highest point
-  Recording room;   ///< reads an earlier lobe and the lamp's centre; assigns lobe_room
+  Recording bounds;  ///< reads the lamp and beam*; assigns lit_*, which replaces the lamp
+  Recording above;   ///< reads the lamp; assigns lamp_above, the height of its highest point
+  Recording room;    ///< reads an earlier lobe and the lamp's centre; assigns lobe_room
   Recording
-      aim;  ///< reads the lamp, shining_*, lobe_room, v_1, v_2, wo_*; assigns wi_*, lamp_density, lamp_rise,
+      aim;  ///< reads the lamp, lobe_room, v_1, v_2, wo_*; assigns wi_*, lamp_density, lamp_rise,
             ///< lamp_solid_angle, lobe_height, and the lobe's to_lamp_*, to_half_*, exponent, radius, end, extent, rise
   Recording low;  ///< reads the lamp and the horizon; assigns lamp_low, the height of its lowest point over the horizon
   Recording cut;  ///< reads the inputs of aim, the lobe and the horizon; changes wi_*, lamp_density, lamp_rise
+  Recording lit;  ///< reads the lamp, full_* (the lamp before its bounds), beam*, the lobe, the horizon, lamp_cut, v_1,
+                  ///< v_2, v_3; changes wi_*, lamp_density, lamp_rise
   Recording emphasis;  ///< reads wi_*, the lobe, lamp_density and lamp_rise; assigns lamp_emphasis
   Recording less;      ///< reads an earlier lobe and wi_*; subtracts the lobe from excess
   Recording send;   ///< reads excess, drawn_density and the results of aim; assigns the lobe's value, weight and colour
@@ -31,7 +32,7 @@ struct AimedSteps {
   Recording alone;  ///< rest without lamps: reads excess and drawn_density
 
   std::vector<Recording> all() const {
-    return {beam, above, room, aim, low, cut, emphasis, less, send, toss, under, meet, rest, alone};
+    return {bounds, above, room, aim, low, cut, lit, emphasis, less, send, toss, under, meet, rest, alone};
   }
 };
 const AimedSteps& aimed_steps();

@@ -33,13 +33,12 @@ constexpr const char* kOslWords = R"(
   chosen chosen_extent chosen_lobe chosen_towards covered covered_before density_under disk_here drawn_density drawn_x
   drawn_y drawn_z earlier earlier_across earlier_along earlier_centre earlier_disk earlier_end earlier_exponent
   earlier_extent earlier_half earlier_lamp earlier_lobe earlier_radius earlier_rise earlier_solid_angle
-  earlier_towards earlier_value excess half_way horizon kept_lamp kept_lobe lamp lamp_above lamp_across lamp_along
-  lamp_centre lamp_density lamp_disk lamp_emphasis lamp_low lamp_met lamp_place lamp_rise lamp_scale lamp_shape
+  earlier_towards earlier_value excess full_across full_along full_centre full_disk half_way horizon kept_lamp kept_lobe lamp lamp_above lamp_across lamp_along
+  lamp_centre lamp_cut lamp_density lamp_disk lamp_emphasis lamp_low lamp_met lamp_place lamp_rise lamp_scale lamp_shape
   lamp_solid_angle lamp_turn lamps lit_across lit_along lit_centre lit_disk lobe_colour lobe_colours lobe_end
   lobe_exponent lobe_extent lobe_followed lobe_half lobe_height lobe_radius lobe_rise lobe_room lobe_towards
   lobe_value lobe_weight lobes ray_x ray_y ray_z rest_colour rest_followed rest_weight several shape_here
-  shining_across shining_along shining_centre shining_disk to_centre to_half_x to_half_y to_half_z to_lamp_x to_lamp_y
-  to_lamp_z tossed v_all
+  to_centre to_half_x to_half_y to_half_z to_lamp_x to_lamp_y to_lamp_z tossed v_all
 )";
 
 /// Prefixes of numbered names.

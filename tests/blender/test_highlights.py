@@ -324,7 +324,7 @@ SHARP = {
     *("IES file of one intensity", "IES file of cosines"),
 }
 #: Allowed error where a boundary of the light crosses the lamp.
-BOUNDED = {"edge of a spot": 0.08, "half below the horizon": 0.04}
+BOUNDED = {"half below the horizon": 0.04}
 #: Allowed error where a form has nothing to average.
 BOUNDED |= {"IES file of one intensity": 0.005, "IES file of cosines": 0.005}
 FULL = pytest.mark.full
