@@ -16,9 +16,10 @@ from ..common import app_handlers, copy_buffer
 from ..content import part_groups
 from . import automatic, choice_sockets, model_nodes, nodes
 
-#: Names of the objects of linked files that are in no collection, and the session's numbers of the
-#: file's own objects, where a list of lamps is linked.
-_hidden, _own = set(), set()
+#: The objects of linked files that are in no collection, as they were after the last update: type
+#: and stem of the name, by library and name. And the session's numbers of the file's own objects.
+#: Both are kept only where a list of lamps is linked.
+_hidden, _own = {}, set()
 
 
 def _dependencies(context, kind, copied=None):
@@ -90,28 +91,46 @@ def _leave_out_lamps(scene):
     if not _hidden and not bpy.data.libraries:
         return
     lists = {group for group in bpy.data.node_groups if lamps.is_group(group)}
-    came = _hidden and [one for one in scene.objects if _has_come(one)]
+    linked = {_of_library(one): one for one in bpy.data.objects if one.library}
+    # Make Local replaces the linked objects. As long as they are there, a new object of such a name
+    # is the user's: added, duplicated or brought back by undo.
+    replaced = {kind for place, kind in _hidden.items() if place not in linked}
+    came = replaced and [one for one in scene.objects if _has_come(one, replaced)]
     for one in _only_listed(came, lists) if came else ():
         for collection in one.users_collection:
             collection.objects.unlink(one)
-    objects = bpy.data.objects if any(group.library for group in lists) else ()
-    _hidden = {_stem(one) for one in objects if one.library and not one.users_collection}
-    _own = {one.session_uid for one in objects if not one.library}
+    if not any(group.library for group in lists):
+        _forget()
+        return
+    hidden = {place: one for place, one in linked.items() if not one.users_collection}
+    _hidden = {place: _kind(one) for place, one in hidden.items()}
+    _own = {one.session_uid for one in bpy.data.objects if not one.library}
 
 
-def _has_come(item):
-    """Whether an object is a local copy of one that was hidden. Blender numbers it if its name is
-    taken."""
-    return item.library is None and item.session_uid not in _own and _stem(item) in _hidden
+def _has_come(item, replaced):
+    """Whether an object is a local copy of one that was linked."""
+    return item.library is None and item.session_uid not in _own and _kind(item) in replaced
 
 
-def _stem(item):
-    return re.sub(r"\.\d+$", "", item.name)
+def _of_library(item):
+    return item.library.filepath, item.name
+
+
+def _kind(item):
+    # Blender numbers a copy if its name is taken.
+    return item.type, re.sub(r"\.\d+$", "", item.name)
 
 
 @persistent
 def _after_update(scene, _):
     _leave_out_lamps(scene)
+
+
+@persistent
+def _forget(*_):
+    """What is known of a file says nothing about the next one."""
+    _hidden.clear()
+    _own.clear()
 
 
 def _is_last(handler, handlers):
@@ -149,7 +168,11 @@ def _after_import(context):
     _leave_out_lamps(bpy.context.scene)
 
 
-_HANDLERS = {"blend_import_post": _after_import, "depsgraph_update_post": _after_update}
+_HANDLERS = {
+    "blend_import_post": _after_import,
+    "depsgraph_update_post": _after_update,
+    "load_pre": _forget,
+}
 
 
 def register():

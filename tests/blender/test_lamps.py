@@ -158,6 +158,73 @@ def test_make_local_brings_no_lamps(extension, studio, empty, own):
     assert [lamp.name for lamp in extension.api.see_lamps(empty) if lamp.slot] == own
 
 
+def _link_metal(studio):
+    bpy.ops.wm.link(directory=f"{studio}/Material/", filename="Studio Metal")
+    ball = helpers.add_sphere(bpy.context.scene, bpy.data.materials["Studio Metal"], segments=8)
+    bpy.context.view_layer.update()
+    return ball
+
+
+def _names(scene):
+    return sorted(item.name for item in scene.objects)
+
+
+def test_where_a_material_is_linked_own_objects_stay(extension, studio, empty):
+    """Objects of the names of the linked file's lamps, and of what these depend on, left the scene
+    when they were added, duplicated or brought back by undo."""
+    _link_metal(studio)
+    names = ["Studio Key", "Studio Rim", "Studio Rig"]
+    made = [add_lamp(empty, "POINT", name) for name in names[:2]]
+    made.append(bpy.data.objects.new("Studio Rig", None))
+    empty.collection.objects.link(made[2])
+    bpy.context.view_layer.update()
+    copies = [one.copy() for one in made]
+    for one in copies:
+        empty.collection.objects.link(one)
+    bpy.context.view_layer.update()
+    assert all(one.users_collection for one in made + copies)
+    bpy.ops.ed.undo_push(message="objects")
+    bpy.data.batch_remove(made + copies)
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="none")
+    bpy.ops.ed.undo()
+    bpy.context.view_layer.update()
+    found = [name.split(".")[0] for name in _names(bpy.context.scene) if name.startswith("Studio")]
+    assert sorted(found) == sorted(2 * names)
+
+
+@pytest.mark.parametrize("then", ["another file", "the same file", "new file"])
+def test_a_file_after_one_with_a_linked_material_keeps_its_objects(
+    extension, studio, tmp_path, then
+):
+    bpy.ops.wm.open_mainfile(filepath=str(studio))
+    path = str(tmp_path / "file.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+    objects = _names(bpy.context.scene)
+    if then == "the same file":
+        bpy.ops.wm.open_mainfile(filepath=path)
+        scene = bpy.context.scene
+        for item in (bpy.data.objects["Studio Ball"], bpy.data.materials["Studio Metal"]):
+            item.name = f"Own {item.name}"
+        _link_metal(studio)
+        bpy.ops.wm.save_mainfile()
+        objects = _names(scene)
+    else:
+        bpy.ops.wm.read_homefile(use_empty=True)
+        _link_metal(studio)
+    if then == "new file":
+        bpy.ops.wm.read_homefile(use_empty=True)
+        objects = ["Studio Key", "Studio Rim"]
+        for name in objects:
+            add_lamp(bpy.context.scene, "POINT", name)
+    else:
+        bpy.ops.wm.open_mainfile(filepath=path)
+    for _ in range(2):
+        bpy.context.scene.objects[objects[0]].location.x += 0.1
+        bpy.context.view_layer.update()
+    assert _names(bpy.context.scene) == objects
+
+
 def test_other_handlers_of_imports_come_first(extension, studio, empty):
     """Those behind would meet pointers to blocks that are gone, and Blender would crash."""
     handlers, seen = bpy.app.handlers.blend_import_post, []
