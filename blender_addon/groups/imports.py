@@ -156,7 +156,8 @@ def _after_import(context):
     imported = [group for group in bpy.data.node_groups if group.session_uid in known]
     groups = [group for group in imported if model_nodes.TAG in group]
     known = {group.session_uid for group in groups}
-    choice_sockets.carry()
+    if not nodes.is_at_work():  # groups under construction lack what is told of them
+        choice_sockets.carry()
     if groups or any(lamps.is_group(group) for group in imported):
         lamps.follow()
         automatic.follow()
