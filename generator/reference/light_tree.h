@@ -142,8 +142,8 @@ class LightTree {
       const double dx = n.x[k] - n.near[k] * p.x, dy = n.y[k] - n.near[k] * p.y, dz = n.z[k] - n.near[k] * p.z;
       const double r = n.radius[k];
       const double inverse = 1 / std::sqrt(maximum(maximum(dx * dx + dy * dy + dz * dz, r * r), kTiny));
-      // Let s be the sine of the angular radius of the bounds, and x a cosine. Then x + s is an upper bound for the
-      // cosine of x's angle reduced by the angular radius, and is 0 where that cosine is.
+      // Let s be the sine of the angular radius of the bounds, and x a cosine. Then x + s is 0 where the cosine of x's
+      // angle reduced by the angular radius is, and for x > 0 an upper bound for it.
       const double s = r * inverse;
       const double cos_i = (dx * normal.x + dy * normal.y + dz * normal.z) * inverse;
       // The shading normal may differ from this normal, so lamps near the horizon keep some weight.
