@@ -47,7 +47,7 @@ class Budget(NamedTuple):
 
     def lamps(self):
         """For how many lamps it suffices."""
-        return min(self.closures, int(min(self.numbers / self.LAMP, SLOTS)), SLOTS)
+        return max(min(self.closures, int(min(self.numbers / self.LAMP, SLOTS)), SLOTS), 0)
 
     def cones(self, wanted):
         """How many cones lamps get that want so many; the first ones come first."""

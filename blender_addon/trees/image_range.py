@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Minimum, maximum and means of the images in textures."""
 
-import os
 from dataclasses import dataclass
 
-import bpy
 import numpy as np
 
 from ..common import color
+from .image_pixels import OfImages
 
 #: Approximate number of pixels of which a mean is taken.
 _SAMPLES = 1 << 16
@@ -25,47 +24,16 @@ class Range:
     bright: np.ndarray
 
 
-#: Cached by image: reading a large one takes half a second.
-_known = {}
-
-
 def of(image):
     """Range of an image; None if there is no image, or if it can't be determined: for movies,
     sequences, tiled images, and colour spaces other than sRGB and data."""
     if image is None or image.source not in {"FILE", "GENERATED"}:
         return None
-    key = (image.session_uid, image.source, image.alpha_mode, image.colorspace_settings.name)
-    key += (_version(image),)
-    if image.is_dirty or key not in _known:  # painting raises no event
-        _known[key] = _read(image)
-    return _known[key]
-
-
-def _version(image):
-    """A key that changes with the file of an image."""
-    if image.packed_file is not None:
-        return image.packed_file.size
-    path = bpy.path.abspath(image.filepath, library=image.library)
-    try:
-        return path, os.stat(path).st_mtime_ns
-    except OSError:
-        return path
-
-
-def _read(image):
-    loaded = image.has_data
-    width, height = image.size
-    pixels = np.empty(width * height * image.channels, np.float32)
-    if len(pixels) == 0 or len(pixels) != len(image.pixels):
-        return None
-    image.pixels.foreach_get(pixels)
-    is_float, channels = image.is_float, image.channels
-    if not loaded and image.source == "FILE":
-        image.buffers_free()
-    return _range(image, pixels.reshape(-1, channels), is_float)
+    return _known.of(image)
 
 
 def _range(image, pixels, is_float):
+    pixels = pixels.reshape(-1, pixels.shape[-1])
     step = max(len(pixels) // _SAMPLES, 1) | 1
     rows = np.concatenate([[pixels.min(0), pixels.max(0)], pixels[::step]]).astype(float)
     if rows.shape[1] < 3:
@@ -86,3 +54,6 @@ def _range(image, pixels, is_float):
     tenth = max(len(by_light) // 10, 1)
     dark, bright = by_light[:tenth].mean(0), by_light[-tenth:].mean(0)
     return Range(rows[0], rows[1], sampled.mean(0), dark, bright)
+
+
+_known = OfImages(_range)

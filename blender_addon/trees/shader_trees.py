@@ -42,6 +42,9 @@ class Reached:
     within: tuple = ()
     #: If there is no output: the input socket whose value applies; if None, the value is 0.
     holder: object = None
+    #: Types of the sockets of groups, reroutes and muted nodes that the value passes on its way, in
+    #: this order. Each converts it; since 5.0 only if Blender computes it itself.
+    types: tuple = ()
 
     @property
     def node(self):
@@ -114,6 +117,7 @@ def reach(socket, within=()):
     uses it, its inputs are outputs of its Group Input node.
     """
     holder, seen = socket, set()
+    types = after_holder = ()
     while True:
         link = _link(socket)
         if link is None:
@@ -127,18 +131,23 @@ def reach(socket, within=()):
             if output not in passes:
                 break
             socket = passes[output]
+            types = (output.type, *types) if _ZERO else (socket.type, output.type, *types)
         elif node.bl_idname == "NodeGroupInput" and within:
             holder = socket = _by_identifier(within[-1].inputs, output.identifier)
             within = within[:-1]
+            types = after_holder = (output.type, *types)
         elif _is_looked_into(node):
             end = _group_end(node.node_tree)
             within = (*within, node)
             holder = socket = end and _by_identifier(end.inputs, output.identifier)
+            types = after_holder = (output.type, *types)
         else:
-            return Reached(output, within)
+            return Reached(output, within, types=types)
         if socket is None:
             return Reached(within=within)
-    return Reached(within=within, holder=holder if socket == holder or not _ZERO else None)
+    if socket != holder and _ZERO:
+        return Reached(within=within)
+    return Reached(within=within, holder=holder, types=after_holder)
 
 
 def _is_looked_into(node):

@@ -5,21 +5,24 @@ Supports the nodes that importers and artists usually place before a material's 
 all other nodes are unknown.
 """
 
+import itertools
+import math
+
+import bpy
 import numpy as np
 
 from ..common import color
 from . import animation, image_range, shader_trees
+from .math_operations import BLENDS, MATH, Unknown, stored
 
+#: Since 5.0, Blender itself computes nodes of constant inputs.
+_FOLDED = bpy.app.version >= (5, 0, 0)
 _WIDTH = {"RGBA": 3, "VECTOR": 3}
-
-
-class Unknown(Exception):
-    """The value varies over the surface, is animated, or comes from an unsupported node."""
 
 
 def constant(socket, within=()):
     """The value of an input socket wherever its node is shown: a number or (r, g, b). None if it
-    varies over the surface, is animated or is unknown, as for images. `within`: as for
+    varies over the surface, is animated, infinite or unknown, as for images. `within`: as for
     shader_trees.reach()."""
     return Constants().told(socket, within)
 
@@ -38,14 +41,37 @@ def _plain(value):
     return tuple(float(v) for v in value) if np.ndim(value) else float(value)
 
 
-def as_type(value, socket):
-    """Converts a linked value to the type of the socket."""
-    wide = socket.type in _WIDTH
-    if wide and not np.ndim(value):
-        return np.full(3, value, float)
-    if not wide and np.ndim(value):
-        return float(color.luminance(np.asarray(value, float)))
+def _converted(value, source, target):
+    """A value as a link between sockets of these types converts it. Raises Unknown."""
+    if target in _WIDTH:
+        return value if np.ndim(value) else np.full(3, value, float)
+    if source == target:
+        return value
+    if np.ndim(value):
+        value = float(color.luminance(value) if source == "RGBA" else np.mean(value))
+    if target == "INT":
+        return float(int(value))
+    if target != "VALUE":
+        raise Unknown
     return value
+
+
+def _along(value, types):
+    """A value that passes sockets of these types. Raises Unknown."""
+    for source, target in itertools.pairwise(types):
+        value = _converted(value, source, target)
+    return value
+
+
+def arriving(value, reached, socket):
+    """What arrives at a socket if what it has `reached` is this value. Raises Unknown."""
+    own = (reached.output or reached.holder).type
+    found = _along(value, (own, *reached.types, socket.type))
+    if _FOLDED and reached.output and reached.types:
+        # Which nodes Blender computes depends on its version.
+        if not np.array_equal(found, _along(value, (own, socket.type))):
+            raise Unknown
+    return found
 
 
 def _own(socket):
@@ -53,7 +79,7 @@ def _own(socket):
     value = getattr(socket, "default_value", None)
     if value is None or isinstance(value, str):
         raise Unknown
-    return np.array(value[:3], float) if hasattr(value, "__len__") else float(value)
+    return stored(value[:3] if hasattr(value, "__len__") else value)
 
 
 def _named(sockets, *names):
@@ -64,28 +90,14 @@ def _clip(value):
     return np.clip(value, 0, 1)
 
 
-_MATH = {
-    "ADD": lambda a, b, c: a + b,
-    "SUBTRACT": lambda a, b, c: a - b,
-    "MULTIPLY": lambda a, b, c: a * b,
-    "DIVIDE": lambda a, b, c: a / b if b else 0.0,
-    "MULTIPLY_ADD": lambda a, b, c: a * b + c,
-    "POWER": lambda a, b, c: a**b if a > 0 else 0.0,
-    "SQRT": lambda a, b, c: max(a, 0.0) ** 0.5,
-    "MINIMUM": lambda a, b, c: min(a, b),
-    "MAXIMUM": lambda a, b, c: max(a, b),
-    "LESS_THAN": lambda a, b, c: float(a < b),
-    "GREATER_THAN": lambda a, b, c: float(a > b),
-    "ABSOLUTE": lambda a, b, c: abs(a),
-}
-#: Result of blending a colour b onto a colour a with factor 1.
-_BLENDS = {
-    "MIX": lambda a, b: b,
-    "MULTIPLY": lambda a, b: a * b,
-    "ADD": lambda a, b: a + b,
-    "SUBTRACT": lambda a, b: a - b,
-    "SCREEN": lambda a, b: 1 - (1 - a) * (1 - b),
-}
+#: Cycles interpolates between this many colours of a ramp, at equal distances.
+RAMP_SIZE = 257
+
+
+def ramp_entries(ramp, low, high):
+    """Those of the colours that Cycles interpolates between these places, counted in colours."""
+    places = np.arange(math.floor(low), math.ceil(high) + 1) / (RAMP_SIZE - 1)
+    return np.array([ramp.evaluate(place) for place in places])
 
 
 class Constants:
@@ -106,10 +118,11 @@ class Constants:
         reached = shader_trees.reach(socket, within)
         if reached.output is not None:
             found = self.output(reached, lambda socket: self.of(socket, reached.within))
-            return as_type(found, socket)
-        if reached.holder is None:
+        elif reached.holder is None:
             return np.zeros(3) if socket.type in _WIDTH else 0.0
-        return as_type(self._own(reached.holder), socket)
+        else:
+            found = self._own(reached.holder)
+        return arriving(found, reached, socket)
 
     def _own(self, socket):
         if self._is_animated(socket.node, animation.value_key(socket)):
@@ -134,7 +147,7 @@ class Constants:
             raise Unknown
         if self.has_animated_settings(node):
             raise Unknown
-        return compute(node, output, of)
+        return stored(compute(node, output, of))
 
     def has_animated_settings(self, node):
         return any(pointer == node.as_pointer() for pointer, _ in self._animated_properties(node))
@@ -145,13 +158,13 @@ class Constants:
     _value = _rgb
 
     def _math(self, node, output, of):
-        if node.operation not in _MATH:
+        operation = MATH.get(node.operation)
+        if operation is None:
             raise Unknown
-        inputs = list(node.inputs)
-        if node.operation == "MULTIPLY" and self._one_is_zero(inputs[:2], of):
+        inputs = node.inputs[: operation.count]
+        if node.operation == "MULTIPLY" and self._one_is_zero(inputs, of):
             return 0.0
-        values = [of(s) if s.enabled else 0.0 for s in inputs]
-        value = _MATH[node.operation](*values)
+        value = operation.value(*map(of, inputs))
         return _clip(value) if node.use_clamp else value
 
     @staticmethod
@@ -168,8 +181,10 @@ class Constants:
         if node.data_type not in {"FLOAT", "RGBA"}:
             raise Unknown
         factor, a, b = (_named(node.inputs, name) for name in ("Factor", "A", "B"))
-        blend = node.blend_type if node.data_type == "RGBA" else "MIX"
-        return self._mixed(blend, factor, a, b, node.clamp_factor, node.clamp_result, of)
+        if node.data_type == "FLOAT":  # the other settings are those of colours
+            return self._mixed("MIX", factor, a, b, node.clamp_factor, False, of)
+        blend, clamps = node.blend_type, (node.clamp_factor, node.clamp_result)
+        return self._mixed(blend, factor, a, b, *clamps, of)
 
     def _mixrgb(self, node, output, of):
         factor, a, b = node.inputs
@@ -177,7 +192,7 @@ class Constants:
 
     @staticmethod
     def _mixed(blend, factor, a, b, clamp_factor, clamp_result, of):
-        if blend not in _BLENDS:
+        if blend not in BLENDS:
             raise Unknown
         t = of(factor)
         t = _clip(t) if clamp_factor else t
@@ -187,7 +202,7 @@ class Constants:
             value = of(b)
         else:
             first = of(a)
-            value = first + t * (_BLENDS[blend](first, of(b)) - first)
+            value = first + t * (BLENDS[blend](first, of(b)) - first)
         return _clip(value) if clamp_result else value
 
     def _clamp(self, node, output, of):
@@ -223,8 +238,16 @@ class Constants:
     _separatergb, _combinergb = _separatexyz, _combinexyz
 
     def _valtorgb(self, node, output, of):
-        found = node.color_ramp.evaluate(of(node.inputs[0]))
-        return found[3] if output.name == "Alpha" else np.array(found[:3])
+        place = of(node.inputs[0])
+        if _FOLDED:
+            found = np.array(node.color_ramp.evaluate(place))
+        else:
+            place = _clip(place) * (RAMP_SIZE - 1)
+            entries, step = ramp_entries(node.color_ramp, place, place), place - int(place)
+            if node.color_ramp.interpolation == "CONSTANT":
+                step = 0.0
+            found = entries[0] + step * (entries[-1] - entries[0])
+        return found[3] if output.name == "Alpha" else found[:3]
 
     def _teximage(self, node, output, of):
         found = image_range.of(node.image) if self._images else None

@@ -9,7 +9,8 @@ import itertools
 import numpy as np
 
 from . import image_range, shader_trees
-from .shader_values import Constants, Unknown, as_type
+from .math_operations import MATH, Bounds, Unknown, at_ends, gamma_bounds, hull, stored
+from .shader_values import RAMP_SIZE, Constants, arriving, ramp_entries
 
 #: Outputs that lie between 0 and 1, by node; None: all of its outputs.
 _FROM_0_TO_1 = {
@@ -26,8 +27,6 @@ _FROM_0_TO_1 = {
     "TexWave": None,
     "TexWhiteNoise": None,
 }
-#: A colour ramp is evaluated at this many places.
-_RAMP = 257
 
 
 def bounds(socket, within=()):
@@ -35,7 +34,7 @@ def bounds(socket, within=()):
     unknown, as those of an attribute, or if the value is animated. `within`: as for
     shader_trees.reach()."""
     try:
-        low, high = _Bounds().of(socket, within)
+        low, high = _Finder().of(socket, within)
     except Unknown:
         return None
     if not np.isfinite([low, high]).all():
@@ -45,13 +44,13 @@ def bounds(socket, within=()):
     )
 
 
-def _union(pairs):
-    lows, highs = (np.broadcast_arrays(*ends) for ends in zip(*pairs, strict=True))
-    return np.minimum.reduce(lows), np.maximum.reduce(highs)
+def _joined(bounds):
+    """The bounds of what lies within any of these."""
+    return hull([end for pair in bounds for end in pair])
 
 
-class _Bounds:
-    """Values are pairs of the smallest and the largest."""
+class _Finder:
+    """Values are Bounds."""
 
     def __init__(self):
         self._constants = Constants(images=True)
@@ -60,8 +59,9 @@ class _Bounds:
         reached = shader_trees.reach(socket, within)
         if reached.output is None:
             value = self._constants.of(socket, within)
-            return value, value
-        return tuple(as_type(end, socket) for end in self._output(reached))
+            return Bounds(value, value)
+        ends = (stored(end) for end in self._output(reached))
+        return Bounds(*(arriving(end, reached, socket) for end in ends))
 
     def _output(self, reached):
         node, output = reached.node, reached.output
@@ -72,7 +72,7 @@ class _Bounds:
             # Noise of other types, or without Normalize, has no bounds.
             if not getattr(node, "normalize", True) or getattr(node, "noise_type", "FBM") != "FBM":
                 raise Unknown
-            return 0.0, 1.0
+            return Bounds(0.0, 1.0)
         known = {}
 
         def of(socket):
@@ -104,52 +104,53 @@ class _Bounds:
                 return here[socket]
 
             found.append(self._constants.output(reached, value))
-        return _union((value, value) for value in found)
+        return hull(found)
 
     def _math(self, reached, of):
-        node, within = reached.node, (0.0, 1.0)
+        node, operation = reached.node, MATH.get(reached.node.operation)
         try:
-            if node.operation == "DIVIDE":
-                low, high = of(node.inputs[1])
-                if low != high and low <= 0 <= high:
-                    raise Unknown
-            within = self._at_ends(reached, of)
+            if operation is None or operation.own_bounds is None:
+                return self._at_ends(reached, of)
+            found = operation.bounds(*map(of, node.inputs[: operation.count]))
+            return Bounds(*np.clip(found, 0.0, 1.0)) if node.use_clamp else found
         except Unknown:
             if not node.use_clamp:
                 raise
-        if node.operation == "ABSOLUTE" and np.prod(of(node.inputs[0])) < 0:
-            within = 0.0, within[1]  # the smallest is between the ends
-        return within
+            return Bounds(0.0, 1.0)
 
     def _maprange(self, reached, of):
         node = reached.node
         if node.data_type != "FLOAT" or not node.clamp:
             raise Unknown
-        return _union(of(node.inputs[name]) for name in ("To Min", "To Max"))
+        return _joined(of(node.inputs[name]) for name in ("To Min", "To Max"))
 
     def _huesaturation(self, reached, of):
-        strength, given = (of(reached.node.inputs[name]) for name in ("Value", "Color"))
-        brightest = np.max(given[1])
-        return 0.0, max(brightest, brightest * strength[1], 0.0)
+        inputs = {"Factor" if s.name == "Fac" else s.name: s for s in reached.node.inputs}
+        strength, factor, given = (of(inputs[name]) for name in ("Value", "Factor", "Color"))
+        brightest = np.max(given.low), np.max(given.high)
+        # Channels of the new colour lie between 0 and its brightest.
+        turned = hull([0.0, *at_ends(lambda a, b: a * b, brightest, strength)])
+        found = at_ends(lambda t, a, b: a + t * (b - a), factor, given, turned)
+        return Bounds(*(np.maximum(end, 0.0) for end in found))
 
     def _gamma(self, reached, of):
-        given, power = (of(s) for s in reached.node.inputs)
-        ends = itertools.product(given, power)
-        return _union((v, v) for v in (np.maximum(a, 0.0) ** b for a, b in ends))
+        given, exponent = (of(s) for s in reached.node.inputs)
+        channels = [gamma_bounds(ends, exponent) for ends in zip(*given, strict=True)]
+        return Bounds(*np.transpose(channels))
 
     def _texchecker(self, reached, of):
-        return _union(of(reached.node.inputs[name]) for name in ("Color1", "Color2"))
+        return _joined(of(reached.node.inputs[name]) for name in ("Color1", "Color2"))
 
     def _texbrick(self, reached, of):
-        return _union(of(reached.node.inputs[name]) for name in ("Color1", "Color2", "Mortar"))
+        return _joined(of(reached.node.inputs[name]) for name in ("Color1", "Color2", "Mortar"))
 
     def _valtorgb(self, reached, of):
-        ramp, (low, high) = reached.node.color_ramp, of(reached.node.inputs[0])
-        places = {float(p) for p in np.linspace(low, high, _RAMP)}
-        places |= {e.position for e in ramp.elements if low <= e.position <= high}
-        colors = np.array([ramp.evaluate(p) for p in places])
+        ends = np.clip(of(reached.node.inputs[0]), 0.0, 1.0)
+        if ends[0] == ends[1]:
+            return self._at_ends(reached, of)
+        colors = ramp_entries(reached.node.color_ramp, *(ends * (RAMP_SIZE - 1)))
         channels = 3 if reached.output.name == "Alpha" else slice(3)
-        return colors[:, channels].min(0), colors[:, channels].max(0)
+        return hull(colors[:, channels])
 
     def _teximage(self, reached, of):
         found = image_range.of(reached.node.image)
@@ -159,4 +160,4 @@ class _Bounds:
         low = found.low[channels]
         if reached.node.extension == "CLIP":  # black beside the image
             low = np.minimum(low, 0.0)
-        return low, found.high[channels]
+        return Bounds(low, found.high[channels])

@@ -2,6 +2,7 @@
 """How forms that aim at lamps know about them: the shared node group and its updates."""
 
 import math
+import os
 import subprocess
 import sys
 from importlib import import_module
@@ -389,6 +390,20 @@ def test_cones_of_flat_lamps(extension, ball, empty, monkeypatch):
     monkeypatch.setattr(update, "others", lambda: [(None, None)])
     extension.api.see_lamps(empty)
     assert codes(empty) == [(1, 0), (1, 0)]
+
+
+@pytest.mark.parametrize("left", [(0, 100.0), (9, 12.5), (9, 0.0), (9, -13.0), (-1, 100.0)])
+def test_a_model_that_leaves_no_room_gets_no_lamp(extension, ball, empty, monkeypatch, left):
+    """Neither all but the faintest lamp nor an error, for which it takes more than nine lamps."""
+    for index in range(11):
+        add_lamp(empty, "POINT", f"{index}", (index, 0, 4))
+    filling = import_module(f"{extension.package}.lamps.filling")
+    budget = import_module(f"{extension.package}.lamps.slots").Budget(*left)
+    monkeypatch.setattr(filling, "budget_of_file", lambda: budget)
+    found = extension.api.see_lamps(empty)
+    assert [lamp.slot for lamp in found] == [None] * 11 and slots(empty) == []
+    filling.memory.scene = None  # as for a scene that has not been surveyed
+    assert [lamp.slot for lamp in filling.last_found(empty)] == [None] * 11
 
 
 def test_lamps_that_never_overlap(extension, ball, empty):
@@ -1584,6 +1599,61 @@ def test_images_of_another_file_with_the_same_name(extension, ball, empty, tmp_p
         bpy.ops.wm.open_mainfile(filepath=str(tmp_path / f"{number}.blend"))
         (slot,) = slots(bpy.context.scene)
         assert axes(slot)[:, 2] == pytest.approx(directions[number], abs=5e-3)
+
+
+def test_an_environment_image_that_changes(extension, ball, empty, tmp_path):
+    """Its spots are those that Cycles shows; the pixels are freed that were read for them."""
+    follow = import_module(f"{extension.package}.lamps.filling").follow
+    directions = (0.6, 0, 0.8), (0, 0.6, 0.8)
+    tree, background, node = environment(empty, spotted(np.array(directions[0]), 0.03, 5000.0))
+    path = tmp_path / "sky.exr"
+
+    def paint(image, direction):
+        pixels = spotted(np.array(direction), 0.03, 5000.0)
+        image.pixels.foreach_set(pixels.astype(np.float32).ravel())
+        image.update()
+
+    def save(direction):
+        image = bpy.data.images.new("saved", 512, 256, float_buffer=True)
+        paint(image, direction)
+        image.file_format = "OPEN_EXR"
+        image.save(filepath=str(path))
+        bpy.data.images.remove(image)
+
+    def seen():
+        follow()
+        bpy.context.view_layer.update()
+        (slot,) = slots(empty, update=False)
+        return axes(slot)[:, 2]
+
+    for direction in directions:
+        paint(node.image, direction)
+        assert seen() == pytest.approx(direction, abs=5e-3), "painted, and not saved"
+    save(directions[0])
+    node.image = bpy.data.images.load(str(path))
+    assert seen() == pytest.approx(directions[0], abs=5e-3)
+    assert not node.image.has_data
+    save(directions[1])
+    os.utime(path, (1, 1))  # some file systems count whole seconds
+    assert seen() == pytest.approx(directions[1], abs=5e-3), "saved again"
+    assert len(node.image.pixels) and node.image.has_data  # as when an editor shows it
+    save(directions[0])
+    os.utime(path, (2, 2))
+    assert seen() == pytest.approx(directions[0], abs=5e-3), "saved while Blender has pixels"
+
+
+def test_the_colour_space_of_an_environment_image_counts(extension, empty, tmp_path):
+    spots = import_module(f"{extension.package}.lamps.kinds.bright_spot")._spots
+    image, pixels = bpy.data.images.new("sky", 64, 32), np.full((32, 64, 4), 0.02, np.float32)
+    pixels[20:22, 10:12] = 0.5
+    image.pixels.foreach_set(pixels.ravel())
+    image.file_format = "PNG"
+    image.save(filepath=str(tmp_path / "sky.png"))
+    image = bpy.data.images.load(str(tmp_path / "sky.png"))
+    ((_, _, dim),) = spots.of(image)
+    image.colorspace_settings.name = "Non-Color"
+    ((_, _, bright),) = spots.of(image)
+    assert bright > 1.5 * dim
 
 
 @pytest.mark.long

@@ -5,6 +5,7 @@ bytes.
 """
 
 import json
+import os
 import resource
 import signal
 import struct
@@ -270,18 +271,37 @@ def test_a_full_disk_leaves_the_old_pack(pack, limit):
     assert contents(folder) == before
 
 
+def count_files(folder):
+    return sum(len(files) for _, _, files in os.walk(folder))
+
+
+def wait_for(found, process):
+    """Waits until found() is true, which must be while the process runs."""
+    end = time.monotonic() + ENDLESS
+    while not found():
+        assert process.poll() is None, "the build has ended"
+        assert time.monotonic() < end, "the build has not begun to write"
+        time.sleep(0.001)
+
+
 @pytest.mark.slow
 def test_a_killed_build_leaves_the_old_pack(pack):
     folder, before = pack
-    for delay in (0.05, 0.2, 0.4):
+    # Killed when it has begun, and while it writes some 270 files.
+    for files in (0, 1, 10):
         process = subprocess.Popen(
             [TOOL, "build", "--model", "ashikhmin_shirley", "--out", folder],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        time.sleep(delay)
-        process.kill()
-        process.wait()
+        staged = folder / f".brdfc-build-{process.pid}"
+        try:
+            wait_for(staged.exists, process)
+            wait_for(lambda staged=staged, files=files: count_files(staged) >= files, process)
+        finally:
+            process.kill()
+        assert process.wait() == -signal.SIGKILL
+        assert staged.exists(), "killed after it had written everything"
         kept = {k: v for k, v in contents(folder).items() if not k.startswith(".brdfc-build-")}
         assert kept == before
     done = run("build", "--model", "lambert", "--out", folder)

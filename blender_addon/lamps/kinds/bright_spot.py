@@ -7,6 +7,7 @@ from mathutils import Euler, Matrix, Vector
 from ...common import color
 from ...common.i18n import say
 from ...trees import shader_trees, shader_values
+from ...trees.image_pixels import OfImages
 from .. import bright_spots, slots
 from .kind import Kind
 
@@ -46,29 +47,19 @@ def _turn_of(shown):
     return None
 
 
-#: Cached by image: a large one takes half a second. Painting raises no event.
-_spots = {}
+def _find(image, pixels, is_float):
+    if pixels.shape[-1] < 3:
+        pixels = pixels[..., :1].repeat(3, axis=-1)
+    pixels = pixels[..., :3]
+    # Float buffers are in the working space already. For bytes, undoing the sRGB curve is enough to
+    # find bright spots.
+    if not is_float and not image.colorspace_settings.is_data:
+        pixels = color.from_srgb(pixels)
+    luminance = np.nan_to_num(np.maximum(color.luminance(pixels), 0), posinf=0.0)
+    return bright_spots.find(luminance)
 
 
-def _image_spots(image):
-    key = (image.session_uid, image.filepath, tuple(image.size), image.source)
-    if key not in _spots:
-        width, height = image.size
-        pixels = np.empty(width * height * image.channels, np.float32)
-        if len(pixels) == 0 or len(pixels) != len(image.pixels):
-            return []
-        image.pixels.foreach_get(pixels)
-        pixels = pixels.reshape(height, width, image.channels)
-        if image.channels < 3:
-            pixels = pixels[..., :1].repeat(3, axis=-1)
-        pixels = pixels[..., :3]
-        # Float buffers are in the working space already. For bytes, undoing the sRGB curve is
-        # enough to find bright spots.
-        if not image.is_float and not image.colorspace_settings.is_data:
-            pixels = color.from_srgb(pixels)
-        luminance = np.nan_to_num(np.maximum(color.luminance(pixels), 0), posinf=0.0)
-        _spots[key] = bright_spots.find(luminance)
-    return _spots[key]
+_spots = OfImages(_find)
 
 
 class BrightSpot(Kind):
@@ -80,7 +71,7 @@ class BrightSpot(Kind):
             return
         name = node.image.name
         turn = _turn_of(shown) if node.projection == "EQUIRECTANGULAR" else None
-        for index, (direction, angle, irradiance) in enumerate(_image_spots(node.image)):
+        for index, (direction, angle, irradiance) in enumerate(_spots.of(node.image) or ()):
             which = say("{image}, bright spot {number}", image=name, number=index + 1)
             power = irradiance * strength
             candidate = slots.Candidate(
@@ -102,4 +93,4 @@ class BrightSpot(Kind):
             yield candidate
 
     def forget(self):
-        _spots.clear()
+        _spots.forget()
