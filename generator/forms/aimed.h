@@ -165,9 +165,8 @@ template <class T> Against<T> against(const LampPatch<T>& patch, const Vec3<T>& 
   return {select(on, T(1), T(0)), select(moves, T(1), T(0)), select(moves, moved, drawn)};
 }
 
-/// Lower bound of the lobe's profile by which emphasis_of() divides. Where a part of a lamp shines, f is
-/// averaged over a shape that reaches a little over the edge of that part, and a lobe that is narrow for other lamps
-/// falls to 0 there.
+/// Lower bound of the lobe's profile by which emphasis_of() divides. Over the lamp itself the profile is 1 to 2 %, so
+/// this only guards against rounding.
 inline constexpr double kLeastProfile = 0.25;
 
 /// Solid angle that the chosen point stands for, over the mean of all points and over the lobe's height there, which is
