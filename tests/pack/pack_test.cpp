@@ -257,7 +257,7 @@ TEST(Shader, AnAlbedoOutputOfLargeTablesIsAShaderOfItsOwn) {
       // Two aimed forms still contain too much for each of their many choices.
       const bool longer = kind == forms::form("aimed") && (name == "ashikhmin_shirley" || name == "radziszewski_alda");
       // A list of nodes is in no file, but Blender makes a node of each entry.
-      EXPECT_LE(text.size(), kind->native() ? 226000u : longer ? 200000u : 118000u) << name << " " << kind->name();
+      EXPECT_LE(text.size(), kind->native() ? 226000u : longer ? 200000u : 117000u) << name << " " << kind->name();
     }
 }
 
