@@ -14,6 +14,7 @@ earlier runs with the same inputs and programs are kept.
 """
 
 import argparse
+import collections
 import os
 import subprocess
 import sys
@@ -305,14 +306,15 @@ def write_sheet(demos, file):
     for row, demo in zip(axes, demos, strict=True):
         shown = [(demo.folder / "data.png", demo.file.name, "the data")]
         for name, title in FITS.items():
-            models = " + ".join(model for model, _ in text_of(demo.materials[name]))
+            counts = collections.Counter(model for model, _ in text_of(demo.materials[name]))
+            models = " + ".join(f"{n} {m}" if n > 1 else m for m, n in counts.items())
             off = f"{title.lower()}, error {percent(demo.misplaced[name])}"
             shown.append((demo.picture(name, False).with_suffix(".png"), models, off))
         for place, (picture, first, second) in zip(row, shown, strict=True):
             place.axis("off")
             place.imshow(pyplot.imread(picture))
             at = {"x": 0.5, "ha": "center", "transform": place.transAxes}
-            place.text(y=-0.07, s=first, fontsize=6.5, **at)
+            place.text(y=-0.07, s=first, fontsize=min(6.5, 260 / len(first)), **at)
             place.text(y=-0.14, s=second, fontsize=6.5, color="0.4", **at)
     figure.subplots_adjust(0.005, 0.05, 0.995, 0.998, 0.03, 0.16)
     figure.savefig(file, dpi=110, pil_kwargs={"quality": 88})
