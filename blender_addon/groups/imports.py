@@ -91,6 +91,9 @@ def _leave_out_lamps(scene):
     if not _hidden and not bpy.data.libraries:
         return
     lists = {group for group in bpy.data.node_groups if lamps.is_group(group)}
+    is_linked = any(group.library for group in lists)
+    if not _hidden and not is_linked:
+        return
     linked = {_of_library(one): one for one in bpy.data.objects if one.library}
     # Make Local replaces the linked objects. As long as they are there, a new object of such a name
     # is the user's: added, duplicated or brought back by undo.
@@ -99,11 +102,10 @@ def _leave_out_lamps(scene):
     for one in _only_listed(came, lists) if came else ():
         for collection in one.users_collection:
             collection.objects.unlink(one)
-    if not any(group.library for group in lists):
+    if not is_linked:
         _forget()
         return
-    hidden = {place: one for place, one in linked.items() if not one.users_collection}
-    _hidden = {place: _kind(one) for place, one in hidden.items()}
+    _hidden = {p: _kind(one) for p, one in linked.items() if not one.users_collection}
     _own = {one.session_uid for one in bpy.data.objects if not one.library}
 
 
