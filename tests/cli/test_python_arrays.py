@@ -128,15 +128,17 @@ def all_choices(model):
 
 def inner_values(model):
     """The defaults, but for those at kinks: at an end of their range, as differences take both
-    sides, and grey, whose channels are all the largest."""
+    sides; grey, whose channels are all the largest; and equal ones, of which a curve's knots may
+    be chosen by the largest."""
     values = {}
-    for name, p in numeric(model).items():
+    for i, (name, p) in enumerate(numeric(model).items()):
         low, high = (p.soft_min, p.soft_max) if kind(p) == "Number" else (0.0, 1.0)
         margin = 0.03 * (high - low)
         value = np.asarray(p.default, float)
         at_an_end = (value <= p.min) | (value >= p.max)
         value = np.where(at_an_end, np.clip(value, low + margin, high - margin), value)
-        values[name] = value * [1, 0.9, 0.8] if kind(p) == "Color" else value
+        apart = np.array([1, 0.9, 0.8]) * (1 - i / 1000)
+        values[name] = value * apart if kind(p) == "Color" else value
     return values
 
 
