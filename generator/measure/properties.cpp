@@ -65,7 +65,9 @@ std::optional<std::string> find_dark_place(const Model& model, const ParamValues
 Edge sharpest_edge(const BoundModel& bound, int arcs, Random& random) {
   const Brdf<double>& brdf = *bound.brdf;
   constexpr int kCoarse = 32, kFine = 8, kCandidates = 3;
-  constexpr double kFinest = 1e-7;  // radians: wide enough to keep rounding out of the slopes
+  // Radians: wide enough to keep rounding out of the slopes. At a width of 1e-7 the slopes of lobes whose width is
+  // 0.001 changed by 0.5 % from curvature alone where light and view graze the surface.
+  constexpr double kFinest = 1e-8;
   Edge worst;
   for (int arc = 0; arc < arcs; ++arc) {
     Vec3<double> wo = uniform_direction(random), wi = uniform_direction(random);

@@ -19,14 +19,15 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Shapes that are tried first: of facets, about the mirror direction, of equal heights, narrow at grazing angles.
-constexpr std::array<double, 4> kShapes = {1, 0, -1, 2};
+/// Shapes (widening, heights) that are tried first: of facets, about the mirror direction, of the projected difference
+/// to it, of equal heights, narrow at grazing angles.
+constexpr std::array<std::array<double, 2>, 5> kShapes = {{{0, 0}, {2, 0.5}, {2, 0}, {4, 1}, {-2, 0}}};
 /// A shape as near to one of them becomes that one, if the error is at most so many times as large.
 constexpr double kBesideShape = 0.1, kAsGood = 1.01;
 /// Roughnesses that are tried: of one, of one with the other shapes, and of each of two.
-constexpr int kPlaces = 17, kPlacesOfOthers = 9, kPlacesEach = 7;
+constexpr int kPlaces = 19, kPlacesOfOthers = 11, kPlacesEach = 7;
 constexpr std::size_t kStarts = 3;  ///< searches begin at the best of them
-constexpr double kSmoothest = 0.003, kRoughest = 1;
+constexpr double kSmoothest = 0.0005, kRoughest = 1;
 constexpr int kFewSteps = 12, kSteps = 60;  ///< of the search for heights
 /// Heights of colours are searched between the exponentials of these: wider than single precision tells from 0
 /// beside 1. The heights that channels share are shadowing, which is seldom less.
@@ -39,7 +40,7 @@ constexpr double kStiffness = 1e-4, kFlatness = 1e-6;
 /// What the highlight's first curve is a function of.
 struct CurveLobe {
   std::vector<double> roughness;
-  double shape;
+  std::vector<double> shape;
 };
 
 /// What pairs of directions determine, for any lobe.
@@ -156,7 +157,7 @@ class Curves {
   ParamValues at(const CurveLobe& lobe) const {
     ParamValues out = values_;
     for (std::size_t i = 0; i < lobe.roughness.size(); ++i) out[roles_.roughness[i]->name] = lobe.roughness[i];
-    out[roles_.shape->name] = lobe.shape;
+    for (std::size_t i = 0; i < lobe.shape.size(); ++i) out[roles_.shape[i]->name] = lobe.shape[i];
     return out;
   }
   VectorXd power(Brdf<double>& brdf, const Pairs& pairs, const VectorXd& unit, Index k) const {
@@ -387,8 +388,8 @@ std::optional<CurveRoles> curve_roles(const Model& model) {
       out.rim = &p;
     else if (p.name == "strength")
       out.strength = &p;
-    else if (p.name == "about")
-      out.shape = &p;
+    else if (p.name == "widening" || p.name == "heights")
+      out.shape.push_back(&p);
     else if (p.name == "ax" || p.name == "ay")
       out.roughness.push_back(&p);
     else
@@ -403,17 +404,25 @@ ModelFit fit_factors(const Model& model, const CurveRoles& roles, bool isotropic
   const Curves curves(model, roles);
   ModelFit out;
   out.model = &model;
-  out.found = int(roles.colors.size() + roles.numbers.size()) + 4 + (isotropic ? 1 : 2);
+  out.found = int(roles.colors.size() + roles.numbers.size()) + 5 + (isotropic ? 1 : 2);
   if (!(fine.light > 0 && last.light > 0)) {
     out.values = curves.matte_alone(last);
     return out;
   }
   // Places: the shape, then the roughnesses.
-  const double first = roles.shape->min, range = roles.shape->max - roles.shape->min;
+  const std::size_t shapes = roles.shape.size();
+  const auto place_of = [&](const std::array<double, 2>& shape) {
+    std::vector<double> t;
+    for (std::size_t i = 0; i < shapes; ++i)
+      t.push_back((shape[i] - roles.shape[i]->min) / (roles.shape[i]->max - roles.shape[i]->min));
+    return t;
+  };
   const auto lobe = [&](const std::vector<double>& t) {
-    CurveLobe out{{}, first + range * t[0]};
+    CurveLobe out;
+    for (std::size_t i = 0; i < shapes; ++i)
+      out.shape.push_back(roles.shape[i]->min + (roles.shape[i]->max - roles.shape[i]->min) * t[i]);
     for (std::size_t i = 0; i < roles.roughness.size(); ++i)
-      out.roughness.push_back(kSmoothest * std::pow(kRoughest / kSmoothest, t[isotropic ? 1 : 1 + i]));
+      out.roughness.push_back(kSmoothest * std::pow(kRoughest / kSmoothest, t[isotropic ? shapes : shapes + i]));
     return out;
   };
   struct Try {
@@ -427,17 +436,20 @@ ModelFit fit_factors(const Model& model, const CurveRoles& roles, bool isotropic
     return heights.error();
   };
   std::vector<Try> tries;
-  for (const double shape : kShapes) {
-    const double t = (shape - first) / range;
-    const int places = shape == kShapes[0] ? kPlaces : kPlacesOfOthers;
+  for (const std::array<double, 2>& shape : kShapes) {
+    const auto try_with = [&](std::initializer_list<double> roughness) {
+      std::vector<double> t = place_of(shape);
+      t.insert(t.end(), roughness);
+      tries.push_back({t});
+    };
+    const bool first = shape == kShapes[0];
+    const int places = first ? kPlaces : kPlacesOfOthers;
     if (isotropic)
-      for (int i = 0; i < places; ++i) tries.push_back({{t, i / (places - 1.)}});
+      for (int i = 0; i < places; ++i) try_with({i / (places - 1.)});
     else
       for (int i = 0; i < kPlacesEach; ++i)
-        for (int j = 0; j < kPlacesEach; ++j) {
-          if (shape != kShapes[0] && (i + j) % 2 != 0) continue;
-          tries.push_back({{t, i / (kPlacesEach - 1.), j / (kPlacesEach - 1.)}});
-        }
+        for (int j = 0; j < kPlacesEach; ++j)
+          if (first || (i + j) % 2 == 0) try_with({i / (kPlacesEach - 1.), j / (kPlacesEach - 1.)});
   }
   for (Try& t : tries) t.error = error(t.t, of_coarse, coarse);
   std::ranges::stable_sort(tries, {}, &Try::error);
@@ -453,10 +465,11 @@ ModelFit fit_factors(const Model& model, const CurveRoles& roles, bool isotropic
   auto heights = std::make_unique<Heights>(curves, lobe(best), of_fine, fine);
   heights->solve(kSteps);
   // A shape that has a name is better than one beside it.
-  const double shape = lobe(best).shape, named = std::round(shape);
-  if (std::abs(shape - named) < kBesideShape) {
+  const std::vector<double> shape = lobe(best).shape;
+  for (const std::array<double, 2>& named : kShapes) {
+    if (std::hypot(shape[0] - named[0], shape[1] - named[1]) > kBesideShape) continue;
     std::vector<double> to = best;
-    to[0] = (named - first) / range;
+    std::ranges::copy(place_of(named), to.begin());
     auto with_name = std::make_unique<Heights>(curves, lobe(to), of_fine, fine);
     with_name->solve(kSteps);
     if (with_name->error() < kAsGood * heights->error()) best = to, heights = std::move(with_name);

@@ -16,7 +16,7 @@ struct CurveRoles {
   const ParamInfo* matte = nullptr;               ///< a colour; the matte light is in proportion to it
   const ParamInfo* rim = nullptr;                 ///< a number: the matte light is a square function of it
   const ParamInfo* strength = nullptr;            ///< a number
-  const ParamInfo* shape = nullptr;               ///< a number: what the lobe is about
+  std::vector<const ParamInfo*> shape;            ///< numbers: what the lobe is about
   std::vector<const ParamInfo*> roughness;        ///< numbers, along the tangent first
   std::vector<const ParamInfo*> colors, numbers;  ///< heights: of each channel, and of all three
 };

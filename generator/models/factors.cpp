@@ -17,24 +17,27 @@
 // Lobes that are not about the half vector. Many models and materials have lobes about the mirror direction instead,
 // which are no such products: seen obliquely, they are wider across the plane of incidence than half vectors allow.
 // With z = cos theta_i - cos theta_o and the horizontal vector p = i + o, the squared sine of half the angle between i
-// and the mirror image of o is (p^2 + z^2) / 4, while tan^2 theta_h = p^2 / (cos theta_i + cos theta_o)^2. The number
-// `about`, here k, leads from the one to the other, and farther:
-//   q - 1 = m^(2 - 2k) [w (s_x^2 / a_x^2 + s_y^2 / a_y^2) + (1 - w) s_z^2 / (a_x a_y)],
-//   m = (cos theta_i + cos theta_o) / 2,  (s_x, s_y, s_z) = (p_x, p_y, z) / (2 m),  w = (1 + min(k, 1)) / 2.
-//   k = 1: the half vector, as above. 0: the mirror direction. -1: the heights cos^2 theta alone, as in the lossless
-//   lobes of Radziszewski and Alda. 2: on the halfway vector disk of Edwards et al., whose lobes narrow towards the
-//   horizon.
-// 1 / cos^4 theta_h belongs to half vectors: D has its power max(0, min(k, 1)), with which f stays finite at the
-// horizon. All of this is symmetric in i and o. Tried in one channel with values of the models at their defaults,
-// percent of the light that is misplaced:
+// and the mirror image of o is (p^2 + z^2) / 4, while tan^2 theta_h = p^2 / (cos theta_i + cos theta_o)^2. The numbers
+// `widening` and `heights`, here e and w, lead from the one to the other, and farther:
+//   q - 1 = m^e [(1 - w) (s_x^2 / a_x^2 + s_y^2 / a_y^2) + w s_z^2 / (a_x a_y)],
+//   m = (cos theta_i + cos theta_o) / 2,  (s_x, s_y, s_z) = (p_x, p_y, z) / (2 m).
+//   e = 0, w = 0: the half vector, as above. 2, 1/2: the mirror direction. 2, 0: p alone, the difference to the mirror
+//   direction projected onto the surface, as in the smooth surfaces of Low et al. (2012), which come nearer to most of
+//   the materials in MERL's database than half vectors do. 4, 1: the heights cos^2 theta alone, as in the lossless
+//   lobes of Radziszewski and Alda. -2, 0: on the halfway vector disk of Edwards et al., whose lobes narrow towards
+//   the horizon.
+// 1 / cos^4 theta_h belongs to half vectors: D has its power max(0, 1 - max(e / 2, 2 w)), with which f stays finite at
+// the horizon. All of this is symmetric in i and o. Tried in one channel with values of the models at their defaults,
+// percent of the light that is misplaced; k is one number for e = 2 - 2 k and w = max(0, (1 - k) / 2):
 //                               ashikhmin_shirley  edwards  lafortune  lossless  max_phong  modified_phong  radz._alda
 //   k = 1                                    12       41         27        43         30              21          22
 //   k = 1 or 0                               12       41        2.3        34        3.8            0.76          10
 //   k                                        12       24        2.2       8.8        2.9            0.76         9.2
-//   exponent of m and w apart                12       24        1.1        11        2.2            0.76         8.9
 //   w, a knotted width over theta           9.4       26        5.8        14        3.6             3.0         7.1
 //   a sum of both products of k = 1          2         32        1.8        32        3.4            0.76         5.5
 //   k and rim                               2.2       24        2.2       8.5        2.9            0.76         9.2
+//   e, w and rim                            1.4       24        1.3       6.4        2.2            0.77         8.5
+// MERL's materials as Low et al. describe them had up to 26 with k, and have at most 1.5 with e and w.
 // Half of what depends on which of two directions is the light's can't be avoided: 24 of edwards, 11 of phong, 5 of
 // glossy_reflector. A retroreflecting lobe is a curve F; turning the view about the normal instead was no better.
 //
@@ -45,8 +48,8 @@
 //
 // Sampling: a matte direction or a half vector. The pdf of ln q, nearly as of D with the largest d of the channels,
 // consists of exponentials, whose integrals are inverted in closed form: fewer than D has, for shorter shaders. Half
-// vectors are sampled as if q - 1 were the quadratic form of the slopes that it is where the slopes are small, for k =
-// 1 everywhere. Elsewhere their pdf may be far too small, so some directions are matte ones in any case.
+// vectors are sampled as if q - 1 were the quadratic form of the slopes that it is where the slopes are small, for half
+// vectors everywhere. Elsewhere their pdf may be far too small, so some directions are matte ones in any case.
 #include "model/base_terms.h"
 #include "model/half_vector.h"
 
@@ -87,7 +90,7 @@ template <class V, std::size_t N, class T> V curve(const std::array<V, N>& at, c
 
 template <class T> struct Factors {
   Rgb<T> rho;
-  T rim, strength, ax, ay, about;
+  T rim, strength, ax, ay, widening, heights;
   std::array<Rgb<T>, kD.size()> d;
   std::array<Rgb<T>, kF.size()> f;
   std::array<T, kG.size() - 1> g;
@@ -117,10 +120,12 @@ template <class T> struct Factors {
     v(ax, NumberSpec{"ax", "Roughness X", 0.2, 1e-4, 1, 0.02, 0.5, "Unit of the slope along the tangent"}.by_factors());
     v(ay,
       NumberSpec{"ay", "Roughness Y", 0.2, 1e-4, 1, 0.02, 0.5, "Unit of the slope across the tangent"}.by_factors());
-    v(about,
-      NumberSpec{"about", "Lobe Shape", 1, -1, 2, -1, 2,
-                 "1: a lobe of facets; 0: about the mirror direction; -1: of equal heights; 2: narrows at grazing "
-                 "angles"});
+    v(widening, NumberSpec{"widening", "Widening", 0, -2, 4, -2, 4,
+                           "How the lobe widens towards grazing angles: 0 as one of facets, 2 as one about the mirror "
+                           "direction, less than 0 narrows it"});
+    v(heights, NumberSpec{"heights", "Heights", 0, 0, 1, 0, 1,
+                          "How the height of the light counts beside half vectors: 0 not, as for facets; 0.5 as for a "
+                          "round lobe about the mirror direction; 1 alone"});
     static constexpr const char* kNames[] = {"d0", "d1", "d2", "d3",  "d4",  "d5",  "d6",
                                              "d7", "d8", "d9", "d10", "d11", "d12", "d13"};
     static constexpr const char* kLabels[] = {"Facets 0",  "Facets 1",  "Facets 2",  "Facets 3", "Facets 4",
@@ -158,11 +163,10 @@ template <class T> struct Factors {
     return out;
   }
 
-  /// The weight w of the half vector's slope beside that of heights.
-  T of_slope() const { return (T(1) + minimum(about, T(1))) / T(2); }
-  T of_heights() const { return (T(1) - minimum(about, T(1))) / T(2); }
-  /// m^(2 - 2k).
-  T narrowing(const T& m2) const { return exp((T(1) - about) * log(m2)); }
+  /// How much of 1 / cos^4 theta_h the distribution has.
+  T of_facets() const { return clamp01(T(1) - maximum(T(0.5) * widening, T(2) * heights)); }
+  /// m^e.
+  T narrowing(const T& m2) const { return exp(T(0.5) * widening * log(m2)); }
 
   /// q - 1, 1 / cos^2 theta_h, and 1 - o.h.
   struct Facet {
@@ -172,8 +176,8 @@ template <class T> struct Factors {
     const HalfVector<T> half(wi, wo);
     const Slopes<T> slope(half.h);
     const T m = named("mean_height", maximum((wi.z + wo.z) / T(2), T(1e-7)));
-    const T heights = named("heights", sqr((wi.z - wo.z) / (T(2) * m)) / ax / ay);
-    const T s2 = of_slope() * (sqr(slope.x / ax) + sqr(slope.y / ay)) + of_heights() * heights;
+    const T s2 = (T(1) - heights) * (sqr(slope.x / ax) + sqr(slope.y / ay)) +
+                 heights * named("height_difference", sqr((wi.z - wo.z) / (T(2) * m)) / ax / ay);
     return {named("s2", narrowing(m * m) * s2), slope.inverse_cos2(), half.one_minus_oh};
   }
 
@@ -200,7 +204,7 @@ template <class T> struct Factors {
     const Facet m = facet(wi, wo);
     const T visible = log_visibility(wi.z) + log_visibility(wo.z);
     // 1 / (a_x a_y q^2 cos^4 theta_h), divided by one factor at a time: q^2 alone may overflow.
-    const T q = T(1) + m.s2, facing = named("facing", exp(clamp01(about) * log(m.inverse_cos2)));
+    const T q = T(1) + m.s2, facing = named("facing", exp(of_facets() * log(m.inverse_cos2)));
     const T density = named("density", facing / (ax * q) * (facing / (ay * q)));
     const T scale = density / (T(4) * pi<T>() * least_height(wi.z) * least_height(wo.z));
     const Rgb<T> matte = rho * (T(kInvPi) * matte_at(wi.z) * matte_at(wo.z));
@@ -245,7 +249,7 @@ template <class T> struct Factors {
 
   /// q - 1 for small slopes, seen from wo: xx x^2 + 2 xy x y + yy y^2, and the determinant's root. There
   /// s_z = (o_x x + o_y y) / n.o. A height that is added in squares to n.o stands for that of a wide lobe at grazing
-  /// views. With k = -1 nothing limits the slopes across the plane of incidence; the lobe is a ring then, and its half
+  /// views. With w = 1 nothing limits the slopes across the plane of incidence; the lobe is a ring then, and its half
   /// vectors have slopes up to the view's. `level` is for that.
   struct Form {
     T xx, xy, yy, root;
@@ -253,8 +257,8 @@ template <class T> struct Factors {
   Form form(const Vec3<T>& wo) const {
     const T z2 = sqr(maximum(wo.z, T(0))) + T(4) * (sqr(ax * wo.x) + sqr(ay * wo.y)) + T(1e-8),
             sides = sqr(wo.x) + sqr(wo.y);
-    const T n = named("narrowing", narrowing(z2)), w = of_slope(), h = of_heights();
-    const T level = T(0.3) * h * z2 / (z2 + sides), of_view = n * h / (z2 * ax * ay);
+    const T n = named("narrowing", narrowing(z2)), w = T(1) - heights;
+    const T level = T(0.3) * heights * z2 / (z2 + sides), of_view = n * heights / (z2 * ax * ay);
     const T x = n * w / sqr(ax) + level, y = n * w / sqr(ay) + level;
     const T det = x * y + of_view * (sqr(wo.x) * y + sqr(wo.y) * x);
     return {named("form_xx", x + of_view * sqr(wo.x)), named("form_xy", of_view * wo.x * wo.y),
@@ -265,13 +269,16 @@ template <class T> struct Factors {
   T highlight_share(const Vec3<T>& wo, const Slant& slant, const Form& form) const {
     const T z = maximum(wo.z, T(0));
     const Rgb<T> log_f = curve(logs(f), passed(kF, T(1) - z));
-    const T highlight =
-        slant.total * max_component(exp(log_f + Rgb<T>(log(strength + tiny<T>())))) / (ax * ay * form.root);
-    const T matte = max_component(rho) * matte_at(z);
+    // Both times a_x a_y and the form's root, by which a strong and narrow highlight would overflow if divided.
+    const T highlight = slant.total * max_component(exp(log_f + Rgb<T>(log(strength + tiny<T>()))));
+    const T matte = max_component(rho) * matte_at(z) * (ax * ay * form.root);
     return named("highlight_share", (T(1) - even_share()) * highlight / maximum(highlight + matte, tiny<T>()));
   }
   /// The probability of sampling all directions alike, larger where the lobe is a ring.
-  T even_share() const { return T(0.2) * clamp01(T(2) * abs(T(1) - about)) + T(0.5) * clamp01(-about); }
+  T even_share() const {
+    return T(0.2) * clamp01(named("from_facets", maximum(abs(widening), T(4) * heights))) +
+           T(0.5) * clamp01(T(2) * heights - T(1));
+  }
 
   /// The pdf of wi for a sampled half vector: p_h / (4 o.h), with p_h = p(s) / cos^3 theta_h and p(s) that of slopes.
   T highlight_pdf(const Vec3<T>& wi, const Vec3<T>& wo, const Slant& slant, const Form& form) const {
@@ -334,7 +341,7 @@ template <class T> struct Factors {
   /// mirror direction.
   ClosureSum<T> base(const Vec3<T>& wo) const {
     const T zo = maximum(wo.z, T(0)), p2 = sqr(ax * wo.x) + sqr(ay * wo.y);
-    const T facets_share = named("facets_share", clamp01(T(1) - T(2) * abs(T(1) - about)));
+    const T facets_share = named("facets_share", clamp01(T(1) - maximum(abs(widening), T(4) * heights)));
     const T zi = lobe_height(zo, T(0.7) * p2);
     // (n.w) Lambda.
     const auto hidden = [&](const T& z) { return p2 / (T(2) * maximum(sqrt(z * z + p2) + z, tiny<T>())); };

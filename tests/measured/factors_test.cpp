@@ -42,9 +42,10 @@ ModelFit fitted(std::shared_ptr<const Table> table, bool isotropic = true) {
 
 TEST(FitFactors, OnlyAModelOfCurvesHasCurves) {
   const auto roles = curve_roles(find_model("factors"));
-  ASSERT_TRUE(roles && roles->matte && roles->rim && roles->strength && roles->shape);
+  ASSERT_TRUE(roles && roles->matte && roles->rim && roles->strength);
+  EXPECT_EQ(roles->shape.size(), 2u);
   EXPECT_EQ(roles->roughness.size(), 2u);
-  EXPECT_EQ(roles->colors.size() + roles->numbers.size() + 6, find_model("factors").info().params.size());
+  EXPECT_EQ(roles->colors.size() + roles->numbers.size() + 7, find_model("factors").info().params.size());
   EXPECT_FALSE(curve_roles(find_model("ward")));
 }
 
@@ -57,7 +58,8 @@ TEST(FitFactors, ColouredCurvesAreFound) {
   const Part made{"factors",
                   {"rho=0.1,0.2,0.05", "ax=0.13", "ay=0.13", "strength=0.7", "d1=0.9,0.8,0.6", "d3=0.6,0.5,0.3",
                    "d5=0.5,0.2,0.2", "d7=0.3,0.1,0.1", "f0=0.3,0.2,0.1", "f3=0.35,0.25,0.15", "g3=0.6"}};
-  EXPECT_LT(fitted(std::make_shared<SumTable>(std::vector{made})).error, 0.01);
+  // The data's curves bend sharply at their knots, which lie elsewhere for the roughness that the search finds.
+  EXPECT_LT(fitted(std::make_shared<SumTable>(std::vector{made})).error, 0.015);
 }
 
 TEST(FitFactors, TwoHighlightsOverAMatteSurface) {
@@ -87,22 +89,55 @@ TEST(FitFactors, BrushedMetal) {
 TEST(FitFactors, LobesOfOtherShapes) {
   struct Row {
     Part made;
-    double least, most, error;  ///< of the shape
+    double widening, heights, error;
   };
-  for (const Row& row : {Row{{"modified_phong", {"e=20"}}, -0.1, 0.1, 0.012}, Row{{"lafortune", {}}, -0.2, 0.2, 0.035},
-                         Row{{"max_phong", {}}, -0.2, 0.2, 0.04}, Row{{"lossless", {}}, -1, -0.8, 0.09},
-                         Row{{"radziszewski_alda", {"n=4"}}, 0, 0.6, 0.12}}) {
+  for (const Row& row : {Row{{"modified_phong", {"e=20"}}, 2, 0.5, 0.012}, Row{{"lafortune", {}}, 2.2, 0.5, 0.025},
+                         Row{{"max_phong", {}}, 2, 0.55, 0.035}, Row{{"coupled", {}}, 2, 0, 0.01},
+                         Row{{"lossless", {}}, 3.8, 1, 0.08}, Row{{"radziszewski_alda", {"n=4"}}, 1.3, 0.45, 0.11}}) {
     const ModelFit fit = fitted(std::make_shared<SumTable>(std::vector{row.made}));
-    const double shape = std::get<double>(fit.values.at("about"));
     EXPECT_LT(fit.error, row.error) << row.made.model;
-    EXPECT_GE(shape, row.least) << row.made.model;
-    EXPECT_LE(shape, row.most) << row.made.model;
+    EXPECT_NEAR(std::get<double>(fit.values.at("widening")), row.widening, 0.3) << row.made.model;
+    EXPECT_NEAR(std::get<double>(fit.values.at("heights")), row.heights, 0.1) << row.made.model;
   }
 }
 
 TEST(FitFactors, FacetsKeepTheirShape) {
   const ModelFit fit = fitted(std::make_shared<Ggx>(0.3));
-  EXPECT_EQ(std::get<double>(fit.values.at("about")), 1);
+  EXPECT_EQ(std::get<double>(fit.values.at("widening")), 0);
+  EXPECT_EQ(std::get<double>(fit.values.at("heights")), 0);
+}
+
+/// What J. Löw, J. Kronander, A. Ynnerman and J. Unger found for materials of MERL's database with their model of
+/// smooth surfaces (BRDF Models for Accurate and Efficient Rendering of Glossy Surfaces, ACM TOG 31(1), 2012, equations
+/// 10 to 14): A / (1 + B |D|^2)^C, where D is the difference of the light's and the mirror direction, projected onto
+/// the surface, times the Fresnel term of a dielectric.
+struct Smooth final : Table {
+  const char* material;
+  Rgb<double> rho, a;
+  double b, c, eta;
+
+  Smooth(const char* material, const Rgb<double>& rho, const Rgb<double>& a, double b, double c, double eta)
+      : material(material), rho(rho), a(a), b(b), c(c), eta(eta) {}
+  Rgb<double> eval(const Vec3<double>& wi, const Vec3<double>& wo) const override {
+    if (!(wi.z > 0 && wo.z > 0)) return Rgb<double>(0);
+    const double d2 = sqr(wi.x + wo.x) + sqr(wi.y + wo.y), apart = sqr(wi.x - wo.x) + sqr(wi.y - wo.y),
+                 cd = std::sqrt(1 - apart / 4), g = std::sqrt(eta * eta + cd * cd - 1),
+                 fresnel = sqr((g - cd) / (g + cd)) / 2 * (1 + sqr((cd * (g + cd) - 1) / (cd * (g - cd) + 1)));
+    return rho / kPi + a * (fresnel * std::pow(1 + b * d2, -c));
+  }
+};
+
+TEST(FitFactors, PublishedFitsOfMeasuredMaterials) {
+  const std::vector<Smooth> materials{
+      {"gold-metallic-paint", {0.0094, 0.0024, 0}, {5.34906, 3.69027, 1.31988}, 9.81648, 1.545613, 1.91911},
+      {"blue-fabric", {0.0187, 0.0206, 0.0492}, {1.15592, 1.3681, 2.1739}, 26.236933, 0.140902, 1.10946},
+      {"chrome", {0.0036, 0.0033, 0.0038}, {901.24337, 704.41989, 639.11621}, 14859.786129, 1.927413, 9.05481},
+      {"steel", {0.0061, 0.0086, 0.0112}, {1538.27729, 1253.70115, 1194.10439}, 68390.138636, 1.369086, 7.25842},
+  };
+  for (const Smooth& m : materials) {
+    const ModelFit fit = fitted(std::make_shared<Smooth>(m));
+    EXPECT_LT(fit.error, 0.02) << m.material;
+  }
 }
 
 TEST(FitFactors, MatteLightThatIsDarkerAtTheRim) {

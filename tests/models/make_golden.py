@@ -1387,12 +1387,11 @@ def factor_product(p, s2, oh, cosines, channel, maths, number):
 def factor_lobe(p, slopes, heights, oh, number):
     """q - 1, and the remaining factor of the highlight but 1 / (4 cos cos): `slopes` are those of
     the half vector, `heights` the cosines to the normal."""
-    k, ax, ay = number(p["about"]), number(p["ax"]), number(p["ay"])
-    m, facing = (heights[0] + heights[1]) / 2, min(max(k, 0), 1)
-    w = (1 + min(k, 1)) / 2
+    e, w, ax, ay = (number(p[name]) for name in ("widening", "heights", "ax", "ay"))
+    m, facing = (heights[0] + heights[1]) / 2, min(max(1 - max(e / 2, 2 * w), 0), 1)
     sz = (heights[0] - heights[1]) / (2 * m)
     along = (slopes[0] / ax) ** 2 + (slopes[1] / ay) ** 2
-    s2 = m ** (2 - 2 * k) * (w * along + (1 - w) * sz**2 / (ax * ay))
+    s2 = m**e * ((1 - w) * along + w * sz**2 / (ax * ay))
     return s2, (oh / m) ** (4 * facing) / (number(math.pi if number is float else mp.pi) * ax * ay)
 
 
@@ -1413,11 +1412,11 @@ def factors_f(p, wi, wo):
 
 def factors_form(p, ko):
     """The quadratic form of slopes by which half vectors are sampled, a matrix."""
-    k, ax, ay = mp.mpf(p["about"]), mp.mpf(p["ax"]), mp.mpf(p["ay"])
-    slope, view = (1 + min(k, 1)) / 2, (1 - min(k, 1)) / 2
+    e, view, ax, ay = (mp.mpf(p[name]) for name in ("widening", "heights", "ax", "ay"))
+    slope = 1 - view
     z2 = ko[2] ** 2 + 4 * ((ax * ko[0]) ** 2 + (ay * ko[1]) ** 2) + mp.mpf("1e-8")
     level = mp.mpf("0.3") * view * z2 / (z2 + ko[0] ** 2 + ko[1] ** 2)
-    n = z2 ** (1 - k)
+    n = z2 ** (e / 2)
     along = n * view / (z2 * ax * ay)
     return mp.matrix(
         [
@@ -1455,8 +1454,8 @@ def factors_pdf(p, wi, wo):
     root = mp.sqrt(mp.det(form))
     highlight = p["strength"] * total * mirrored / (mp.mpf(p["ax"]) * mp.mpf(p["ay"]) * root)
     matte = max(mp.mpf(c) for c in p["rho"]) * factors_matte(p, ko[2], mp.mpf)
-    k = mp.mpf(p["about"])
-    even = mp.mpf("0.2") * min(2 * abs(1 - k), 1) + mp.mpf("0.5") * max(min(-k, 1), 0)
+    e, w = mp.mpf(p["widening"]), mp.mpf(p["heights"])
+    even = mp.mpf("0.2") * min(max(abs(e), 4 * w), 1) + mp.mpf("0.5") * max(2 * w - 1, 0)
     share = (1 - even) * highlight / (highlight + matte)
     slopes = mp.matrix([h[0] / h[2], h[1] / h[2]])
     s2 = (slopes.T * form * slopes)[0]
@@ -2433,7 +2432,8 @@ MODELS = {
             "strength": 1,
             "ax": 0.2,
             "ay": 0.2,
-            "about": 1,
+            "widening": 0,
+            "heights": 0,
         }
         | {f"d{k}": (1, 1, 1) for k in range(14)}
         | {f"f{k}": (0.05 + 0.95 * x**5,) * 3 for k, x in enumerate(F_KNOTS)}
@@ -2450,15 +2450,24 @@ MODELS = {
             {"d0": (0.01, 0.01, 0.01), "d6": (0.3, 0.2, 0.1), "g1": 0.5, "g2": 1, "rho": (0, 0, 0)},
             {"ax": 1, "ay": 1, "strength": 1e3, "d13": (1e-6, 1e-3, 0)},
             {"ax": 1e-4, "ay": 1e-4},
-            {"about": 0, "ax": 0.05, "ay": 0.1, "d5": (0.5, 0.3, 0.1), "rim": 1},
-            {"about": -1, "rho": (0.3, 0.2, 0.1), "rim": 0.5},
-            {"about": 0.4, "ax": 0.4, "ay": 0.1, "d9": (0.1, 0.1, 0.1)},
-            {"about": 2, "ax": 0.3, "ay": 0.3, "d13": (1e-3, 1e-3, 1e-3)},
+            {
+                "widening": 2,
+                "heights": 0.5,
+                "ax": 0.05,
+                "ay": 0.1,
+                "d5": (0.5, 0.3, 0.1),
+                "rim": 1,
+            },
+            {"widening": 4, "heights": 1, "rho": (0.3, 0.2, 0.1), "rim": 0.5},
+            {"widening": 1.2, "heights": 0.3, "ax": 0.4, "ay": 0.1, "d9": (0.1, 0.1, 0.1)},
+            {"widening": -2, "ax": 0.3, "ay": 0.3, "d13": (1e-3, 1e-3, 1e-3)},
+            {"widening": 2, "ax": 0.1, "ay": 0.2, "d3": (0.3, 0.5, 0.2)},
         ],
         albedo_cases=[
             {},
             {"ax": 0.4, "ay": 0.4, "d2": (0.3, 0.3, 0.3), "g4": 0.2, "strength": 2, "rim": 0.7},
-            {"ax": 0.4, "ay": 0.4, "about": 0},
+            {"ax": 0.4, "ay": 0.4, "widening": 2, "heights": 0.5},
+            {"ax": 0.4, "ay": 0.4, "widening": 2},
         ],
         cosines=[1, 0.5, 0.1],
         # Logarithms as large as 70 are added, whose rounding errors are those of a number near 70.
