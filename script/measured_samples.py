@@ -4,6 +4,7 @@ The Python package of `brdfc python` must be importable."""
 
 import numpy as np
 from measured_formats import direction, merl, merl_directions, tensor
+from published_materials import smooth_surface
 
 
 def f_of(models, wi, wo):
@@ -23,6 +24,17 @@ def car_paint():
     wi, wo = merl_directions()
     f = f_of(models, wi, wo)
     return merl(f * np.random.default_rng(1).normal(1, 0.02, f.shape))
+
+
+def gold_paint():
+    """MERL's format: gold-metallic-paint of its database, by the parameters that Low and others
+    published."""
+    wi, wo = merl_directions()
+    matte = np.array([0.0094, 0.0024, 0]) / np.pi
+    gloss = np.array([5.34906, 3.69027, 1.31988])
+    f = matte + smooth_surface(wi, wo, A=gloss, B=9.81648, C=1.545613, eta=1.91911)
+    above = (wi[:, 2:] > 0) & (wo[:, 2:] > 0)
+    return merl(np.where(above, f, -1))
 
 
 def brushed_copper():
@@ -82,6 +94,10 @@ MADE = {
     "car-paint.binary": (
         "Blue paint with flakes under a clear coat, in MERL's format, with noise of 2 %",
         car_paint,
+    ),
+    "gold-paint.binary": (
+        "Gold paint of MERL's database, as Low and others describe it",
+        gold_paint,
     ),
     "brushed-copper.bsdf": (
         "Brushed copper with a wide glow, anisotropic, in RGL's format",
