@@ -29,10 +29,12 @@ Some rows are measured in another way:
 - **smooth normals, Normal input, bump correction**: a cell is the fraction of the reflected light
   that is lost, in the worst of three views, where normals are tilted. The normals are those of the
   mesh, those of the input *Normal*, and the same with Bump Map Correction on. In these rows bold
-  means that a form loses more or less than the model's own rays do below the surface.
+  means that a form loses more or less than the model's own rays do below the surface, by 2 % and,
+  for a fit, by more than the error that it states.
 - **denoising albedo, colour passes**: the mean difference from the model's albedo. **denoising
-  normal**: the median angle from the true normal. **light group**: the largest difference between
-  the picture and the sum of its light groups.
+  normal**: the median angle from the true normal, bold if it also differs from pixel to pixel,
+  which misleads denoisers. **light group**: the largest difference between the picture and the sum
+  of its light groups.
 - **lamp without shadows** has a sun overhead, and **lamp without multiple importance** a sun 1 rad
   wide. Each is compared with the same sun with the setting on.
 - **lamp linked elsewhere** adds a sun that is linked to another object only. **nine lamps for one**
