@@ -26,9 +26,9 @@
 //   the materials in MERL's database than half vectors do. 4, 1: the heights cos^2 theta alone, as in the lossless
 //   lobes of Radziszewski and Alda. -2, 0: on the halfway vector disk of Edwards et al., whose lobes narrow towards
 //   the horizon.
-// 1 / cos^4 theta_h belongs to half vectors: D has its power max(0, 1 - max(e / 2, 2 w)), with which f stays finite at
-// the horizon. All of this is symmetric in i and o. Tried in one channel with values of the models at their defaults,
-// percent of the light that is misplaced; k is one number for e = 2 - 2 k and w = max(0, (1 - k) / 2):
+// 1 / cos^4 theta_h belongs to half vectors: D has its power max(0, 1 - 2 w) min(1, max(0, 1 - e / 2)), with which
+// f stays finite at the horizon. All of this is symmetric in i and o. Tried in one channel with values of the models at
+// their defaults, percent of the light that is misplaced; k is one number for e = 2 - 2 k and w = max(0, (1 - k) / 2):
 //                               ashikhmin_shirley  edwards  lafortune  lossless  max_phong  modified_phong  radz._alda
 //   k = 1                                    12       41         27        43         30              21          22
 //   k = 1 or 0                               12       41        2.3        34        3.8            0.76          10
@@ -164,7 +164,7 @@ template <class T> struct Factors {
   }
 
   /// How much of 1 / cos^4 theta_h the distribution has.
-  T of_facets() const { return clamp01(T(1) - maximum(T(0.5) * widening, T(2) * heights)); }
+  T of_facets() const { return maximum(T(1) - T(2) * heights, T(0)) * clamp01(T(1) - T(0.5) * widening); }
   /// m^e.
   T narrowing(const T& m2) const { return exp(T(0.5) * widening * log(m2)); }
 
@@ -276,7 +276,7 @@ template <class T> struct Factors {
   }
   /// The probability of sampling all directions alike, larger where the lobe is a ring.
   T even_share() const {
-    return T(0.2) * clamp01(named("from_facets", maximum(abs(widening), T(4) * heights))) +
+    return T(0.2) * minimum(named("from_facets", abs(widening) + T(4) * heights), T(1)) +
            T(0.5) * clamp01(T(2) * heights - T(1));
   }
 
@@ -341,7 +341,7 @@ template <class T> struct Factors {
   /// mirror direction.
   ClosureSum<T> base(const Vec3<T>& wo) const {
     const T zo = maximum(wo.z, T(0)), p2 = sqr(ax * wo.x) + sqr(ay * wo.y);
-    const T facets_share = named("facets_share", clamp01(T(1) - maximum(abs(widening), T(4) * heights)));
+    const T facets_share = named("facets_share", clamp01(T(1) - abs(widening) - T(4) * heights));
     const T zi = lobe_height(zo, T(0.7) * p2);
     // (n.w) Lambda.
     const auto hidden = [&](const T& z) { return p2 / (T(2) * maximum(sqrt(z * z + p2) + z, tiny<T>())); };

@@ -1388,7 +1388,7 @@ def factor_lobe(p, slopes, heights, oh, number):
     """q - 1, and the remaining factor of the highlight but 1 / (4 cos cos): `slopes` are those of
     the half vector, `heights` the cosines to the normal."""
     e, w, ax, ay = (number(p[name]) for name in ("widening", "heights", "ax", "ay"))
-    m, facing = (heights[0] + heights[1]) / 2, min(max(1 - max(e / 2, 2 * w), 0), 1)
+    m, facing = (heights[0] + heights[1]) / 2, max(1 - 2 * w, 0) * min(max(1 - e / 2, 0), 1)
     sz = (heights[0] - heights[1]) / (2 * m)
     along = (slopes[0] / ax) ** 2 + (slopes[1] / ay) ** 2
     s2 = m**e * ((1 - w) * along + w * sz**2 / (ax * ay))
@@ -1455,7 +1455,7 @@ def factors_pdf(p, wi, wo):
     highlight = p["strength"] * total * mirrored / (mp.mpf(p["ax"]) * mp.mpf(p["ay"]) * root)
     matte = max(mp.mpf(c) for c in p["rho"]) * factors_matte(p, ko[2], mp.mpf)
     e, w = mp.mpf(p["widening"]), mp.mpf(p["heights"])
-    even = mp.mpf("0.2") * min(max(abs(e), 4 * w), 1) + mp.mpf("0.5") * max(2 * w - 1, 0)
+    even = mp.mpf("0.2") * min(abs(e) + 4 * w, 1) + mp.mpf("0.5") * max(2 * w - 1, 0)
     share = (1 - even) * highlight / (highlight + matte)
     slopes = mp.matrix([h[0] / h[2], h[1] / h[2]])
     s2 = (slopes.T * form * slopes)[0]
