@@ -22,9 +22,9 @@
 //   q - 1 = m^e [(1 - w) (s_x^2 / a_x^2 + s_y^2 / a_y^2) + w s_z^2 / (a_x a_y)],
 //   m = (cos theta_i + cos theta_o) / 2,  (s_x, s_y, s_z) = (p_x, p_y, z) / (2 m).
 //   e = 0, w = 0: the half vector, as above. 2, 1/2: the mirror direction. 2, 0: p alone, the difference to the mirror
-//   direction projected onto the surface, as in the smooth surfaces by which Low et al. (2012) describe the materials in
-//   MERL's database. 4, 1: the heights cos^2 theta alone, as in the lossless lobes of Radziszewski and Alda. -2, 0: on
-//   the halfway vector disk of Edwards et al., whose lobes narrow towards the horizon.
+//   direction projected onto the surface, as in the smooth surfaces by which Low et al. (2012) describe the materials
+//   in MERL's database. 4, 1: the heights cos^2 theta alone, as in the lossless lobes of Radziszewski and Alda. -2, 0:
+//   on the halfway vector disk of Edwards et al., whose lobes narrow towards the horizon.
 // 1 / cos^4 theta_h belongs to half vectors: D has its power max(0, 1 - 2 w) min(1, max(0, 1 - e / 2)), with which
 // f stays finite at the horizon. All of this is symmetric in i and o. Tried in one channel with values of the models at
 // their defaults, percent of the light that is misplaced; k is one number for e = 2 - 2 k and w = max(0, (1 - k) / 2):
