@@ -29,13 +29,12 @@ def of_elsewhere(scene):
 
 
 def lacks_osl(scene):
-    """Whether Cycles renders a scene without Open Shading Language, or on a GPU. A Blender that
-    was built without OSL lacks it under every engine."""
+    """Whether Cycles would render a scene without Open Shading Language, or on a GPU, also if
+    another engine is selected, as in a new file: a material may be linked into a file that selects
+    Cycles. A Blender that was built without OSL lacks it in every scene."""
     if not pack.osl_available():
         return True
-    if scene is None or scene.render.engine != "CYCLES":
-        return False
-    return not scene.cycles.shading_system or gpu(scene) is not None
+    return scene is not None and (not scene.cycles.shading_system or gpu(scene) is not None)
 
 
 def is_eevee(scene):

@@ -52,9 +52,9 @@ def _maker(node, own):
 
 
 def _is_within(value, limits):
-    """Whether a value is within limits; sockets hold single precision, so with a tolerance."""
-    slack = 1e-6 * max(abs(limits["min"]), abs(limits["max"]))
-    return limits["min"] - slack <= value <= limits["max"] + slack
+    """Whether a value is within limits, each with a tolerance, as sockets hold single precision."""
+    low, high = limits["min"], limits["max"]
+    return low - 1e-6 * abs(low) <= value <= high + 1e-6 * abs(high)
 
 
 def _outside(value, label, limits):

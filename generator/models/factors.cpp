@@ -22,10 +22,9 @@
 //   q - 1 = m^e [(1 - w) (s_x^2 / a_x^2 + s_y^2 / a_y^2) + w s_z^2 / (a_x a_y)],
 //   m = (cos theta_i + cos theta_o) / 2,  (s_x, s_y, s_z) = (p_x, p_y, z) / (2 m).
 //   e = 0, w = 0: the half vector, as above. 2, 1/2: the mirror direction. 2, 0: p alone, the difference to the mirror
-//   direction projected onto the surface, as in the smooth surfaces of Low et al. (2012), which come nearer to most of
-//   the materials in MERL's database than half vectors do. 4, 1: the heights cos^2 theta alone, as in the lossless
-//   lobes of Radziszewski and Alda. -2, 0: on the halfway vector disk of Edwards et al., whose lobes narrow towards
-//   the horizon.
+//   direction projected onto the surface, as in the smooth surfaces by which Low et al. (2012) describe the materials
+//   in MERL's database. 4, 1: the heights cos^2 theta alone, as in the lossless lobes of Radziszewski and Alda. -2, 0:
+//   on the halfway vector disk of Edwards et al., whose lobes narrow towards the horizon.
 // 1 / cos^4 theta_h belongs to half vectors: D has its power max(0, 1 - 2 w) min(1, max(0, 1 - e / 2)), with which
 // f stays finite at the horizon. All of this is symmetric in i and o. Tried in one channel with values of the models at
 // their defaults, percent of the light that is misplaced; k is one number for e = 2 - 2 k and w = max(0, (1 - k) / 2):
@@ -37,7 +36,7 @@
 //   a sum of both products of k = 1          2         32        1.8        32        3.4            0.76         5.5
 //   k and rim                               2.2       24        2.2       8.5        2.9            0.76         9.2
 //   e, w and rim                            1.4       24        1.3       6.4        2.2            0.77         8.5
-// MERL's materials as Low et al. describe them had up to 26 with k, and have at most 1.5 with e and w.
+// MERL's materials as Low et al. describe them: up to 26 with k and rim, at most 1.9 with e, w and rim.
 // Half of what depends on which of two directions is the light's can't be avoided: 24 of edwards, 11 of phong, 5 of
 // glossy_reflector. A retroreflecting lobe is a curve F; turning the view about the normal instead was no better.
 //

@@ -272,10 +272,10 @@ def test_baking_follows(extension, new_file):
     np.testing.assert_allclose(baked[False].mean((0, 1)), baked[True].mean((0, 1)), rtol=0.05)
 
 
-@pytest.mark.parametrize("change", ["engine", "CUDA", "OPTIX", "build", "osl"])
+@pytest.mark.parametrize("change", ["engine", "new file", "CUDA", "OPTIX", "build", "osl"])
 def test_what_lacks_osl(extension, new_file, monkeypatch, change):
     """A GPU, another engine, a Blender that was built without Open Shading Language."""
-    new_file.cycles.shading_system = change != "osl"
+    new_file.cycles.shading_system = change not in ("osl", "new file")
     material = extension.api.new_material("shirley_1991")
     wanted = "nodes"
     if change in ("CUDA", "OPTIX"):  # OptiX could run the shaders, but nobody has seen it do so
@@ -286,6 +286,9 @@ def test_what_lacks_osl(extension, new_file, monkeypatch, change):
     elif change == "engine":
         # There Blender's own nodes stand in, selected inside the group.
         new_file.render.engine, wanted = "BLENDER_WORKBENCH", "exact"
+    elif change == "new file":
+        # The engine of new files is not Cycles. What is saved there may be linked elsewhere.
+        new_file.render.engine = "BLENDER_WORKBENCH"
     update(new_file)
     assert form_of(extension, material) == wanted
     if change == "build":

@@ -1199,6 +1199,11 @@ def test_warning_out_of_range(extension, empty):
     assert [w.code for w in found] == ["out_of_range"] and "1.5" in found[0].message
     extension.model_nodes.sockets(node)["r0"].default_value = 1.0
     assert codes(extension, material, empty) == []
+    # A range that ends at 6e29 begins at 0 all the same.
+    material = clean(extension, empty, "factors", "sampled")
+    node = extension.model_nodes.group_nodes(material)[0]
+    extension.model_nodes.sockets(node)["strength"].default_value = -1
+    assert "out_of_range" in codes(extension, material, empty)
 
 
 def test_warnings_reach_nested_groups(extension, empty):
