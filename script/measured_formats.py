@@ -32,6 +32,11 @@ def merl_directions():
     return wi, 2 * (wi * half).sum(-1, keepdims=True) * half - wi
 
 
+def above(wi, wo):
+    """Whether both directions (N, 3) are above the surface, (N, 1)."""
+    return (wi[:, 2:] > 0) & (wo[:, 2:] > 0)
+
+
 def merl(f):
     """`f` has a row of r, g, b for each pair of merl_directions()."""
     planes = (np.asarray(f, float) / MERL_SCALES).T

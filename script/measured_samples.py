@@ -3,7 +3,7 @@
 The Python package of `brdfc python` must be importable."""
 
 import numpy as np
-from measured_formats import direction, merl, merl_directions, tensor
+from measured_formats import above, direction, merl, merl_directions, tensor
 from published_materials import smooth_surface
 
 
@@ -33,8 +33,7 @@ def gold_paint():
     matte = np.array([0.0094, 0.0024, 0]) / np.pi
     gloss = np.array([5.34906, 3.69027, 1.31988])
     f = matte + smooth_surface(wi, wo, A=gloss, B=9.81648, C=1.545613, eta=1.91911)
-    above = (wi[:, 2:] > 0) & (wo[:, 2:] > 0)
-    return merl(np.where(above, f, -1))
+    return merl(np.where(above(wi, wo), f, -1))
 
 
 def brushed_copper():

@@ -22,7 +22,7 @@ from measured_files import (
     utia,
     utia_directions,
 )
-from measured_formats import merl, merl_directions, tensor, unit
+from measured_formats import above, merl, merl_directions, tensor, unit
 from support import ROOT, TOOL, run, scene
 
 COLUMNS = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z"
@@ -49,10 +49,6 @@ def told(file):
     done = run("measured", file, "--json", "--models", "none")
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
-
-
-def above(wi, wo):
-    return ((wi[:, 2] > 0) & (wo[:, 2] > 0))[:, None]
 
 
 def glossy(wi, wo, exponent=30):
