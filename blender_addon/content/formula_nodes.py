@@ -10,6 +10,7 @@ nodes for ideal reflection and refraction.
 import math
 
 from . import formula_lamps, svm_constants
+from .closure_nodes import within
 from .part_groups import Parts, add_group, make_group
 from .wiring import Wiring
 
@@ -124,15 +125,6 @@ def _direction(w, u, v):
     return w.combine(x, y, height)
 
 
-def _within(w, parameter, low, high):
-    """A parameter within its bounds, as a link may give it any value; None is no bound."""
-    for operation, bound in (("MAXIMUM", low), ("MINIMUM", high)):
-        if bound is not None:
-            compute = w.vector if isinstance(bound, list) else w.math
-            parameter = compute(operation, parameter, bound)
-    return parameter
-
-
 def wire(tree, data, normal, tangent, parameters, outputs_of_slots, cones, title):
     """Adds a model's nodes as a group. Returns the outputs by name: the BSDF, and the Albedo where
     the model consists of Blender's own closures only.
@@ -174,7 +166,7 @@ def _wired(w, data, normal, tangent, parameters, of_slots, cones, title):
     lists = {name: svm_constants.prepared(name, part) for name, part in data["parts"].items()}
     parts = Parts(w, lists, title, constants)
     bounds = {name: data["bounds"].get(name, (None, None)) for name in parameters}
-    parameters = {name: _within(w, value, *bounds[name]) for name, value in parameters.items()}
+    parameters = {name: within(w, value, *bounds[name]) for name, value in parameters.items()}
     surface = _Surface(w, parts, geometry, normal, None if data["isotropic"] else tangent)
     side = w.math("MULTIPLY_ADD", surface.backfacing, -2.0, 1.0)
     given = {**parameters, **surface.wo, "side": side, "path_length": surface.path_length}

@@ -68,6 +68,17 @@ Json json_of(const NodeProgram& program) {
   return {{"inputs", inputs}, {"operations", operations}, {"outputs", outputs}, {"live", program.live}};
 }
 
+Json bounds_json(const ModelInfo& info, const ParamValues& fixed) {
+  Json bounds = Json::object();
+  for (const ParamInfo& p : info.params) {
+    if (fixed.count(p.name)) continue;
+    const auto grey = [](double value) { return Json{value, value, value}; };
+    if (p.kind == ParamKind::Number) bounds[p.name] = {p.min, p.max};
+    if (p.kind == ParamKind::Color) bounds[p.name] = {grey(p.min), p.may_exceed ? Json() : grey(p.max)};
+  }
+  return bounds;
+}
+
 NodeProgram record_bend() {
   return recorded([](Program& p) {
     const Vec3<Expr> g = input3("true"), wo = input3("view"), n = input3("normal");

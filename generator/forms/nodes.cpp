@@ -348,17 +348,11 @@ class Nodes final : public Form {
 Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_lamps) {
   Shader out;
   out.name = fmt::format("brdfc_{}_nodes", model.info().name);
-  Json parts = Json::object(), bounds = Json::object();
+  Json parts = Json::object();
   const auto add = [&](const char* name, const NodeProgram& program) {
     parts[name] = json_of(program);
     out.operations += int(program.operations.size());
   };
-  for (const ParamInfo& p : model.info().params) {
-    if (fixed.count(p.name)) continue;
-    const auto grey = [](double value) { return Json{value, value, value}; };
-    if (p.kind == ParamKind::Number) bounds[p.name] = {p.min, p.max};
-    if (p.kind == ParamKind::Color) bounds[p.name] = {grey(p.min), p.may_exceed ? Json() : grey(p.max)};
-  }
   if (model.info().look != Look::Matte) add("bend", record_bend());
   add("raise", record_raise());
   Recorder recorder;
@@ -390,7 +384,7 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
                     {"narrow", kNarrow},
                     {"widest", kWidestWidened},
                     {"lamps", out.lamps},
-                    {"bounds", bounds},
+                    {"bounds", bounds_json(model.info(), fixed)},
                     {"closures", first.closures},
                     {"base", first.of_base},
                     {"parts", parts}};

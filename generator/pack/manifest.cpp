@@ -97,17 +97,18 @@ Json parameters_json(const Model& model, const ParamValues& fixed) {
   return list;
 }
 
-Json error_json(const forms::FormError& e) {
-  return {{"relative_l1", e.relative_l1 ? Json(*e.relative_l1) : Json()},
-          {"relative_l2", e.relative_l2 ? Json(*e.relative_l2) : Json()},
-          {"albedo", e.albedo},
-          {"note", e.note}};
-}
-
 Json values_json(const ParamValues& values) {
   Json j = Json::object();
   for (const auto& [name, value] : values) j[name] = std::visit([](const auto& v) { return Json(v); }, value);
   return j;
+}
+
+Json error_json(const forms::FormError& e) {
+  return {{"relative_l1", e.relative_l1 ? Json(*e.relative_l1) : Json()},
+          {"relative_l2", e.relative_l2 ? Json(*e.relative_l2) : Json()},
+          {"albedo", e.albedo},
+          {"note", e.note},
+          {"at", values_json(e.at)}};
 }
 
 Json optical_json(const Model& model, const ParamValues& values) {
