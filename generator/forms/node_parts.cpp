@@ -49,9 +49,9 @@ void take_part(LampCone<Expr>& cone) {
 }  // namespace
 
 const std::set<std::string>& node_vectors() {
-  static const std::set<std::string> names = {"across", "aim",   "along", "at",  "away",  "axis",  "lit_place",
-                                              "normal", "other", "place", "ray", "scale", "shape", "towards",
-                                              "true",   "turn",  "view",  "wi",  "wo"};
+  static const std::set<std::string> names = {"across", "aim",   "along", "at",   "away",  "axis",  "lit_place",
+                                              "normal", "other", "place", "ray",  "scale", "shape", "towards",
+                                              "true",   "turn",  "drawn", "view", "wi",    "wo"};
   return names;
 }
 
@@ -220,7 +220,8 @@ NodeProgram record_lobe() {
 }
 NodeProgram record_rest() {
   return recorded([](Program& p) {
-    const Rgb<Expr> weight = Rgb<Expr>::input("weight") * (Expr(1.0) - Expr::input("lost"));
+    const Expr density = maximum(Expr::input("density"), tiny<Expr>());
+    const Rgb<Expr> weight = Rgb<Expr>::input("value") * ((Expr(1.0) - Expr::input("lost")) / density);
     p.output("color", weight * kept(max_component(weight), Expr::input("u")));
   });
 }

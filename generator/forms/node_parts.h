@@ -32,8 +32,8 @@ print::NodeProgram record_flat();
 print::NodeProgram record_beam();
 print::NodeProgram record_met();
 print::NodeProgram record_lobe();
-/// The weight of the drawn direction. `lost` is the part of its light that a lamp's closure carries, and 1 below the
-/// surface.
+/// The weight of the drawn direction, its value divided by its density. `lost` is the part of its light that a lamp's
+/// closure carries, and 1 below the surface.
 print::NodeProgram record_rest();
 
 }  // namespace brdfc::forms
