@@ -15,6 +15,7 @@
 #include "measured/fit_problem.h"
 #include "measured/pairs.h"
 #include "model/choices.h"
+#include "trace/program.h"
 
 namespace brdfc::measured {
 namespace {
@@ -181,6 +182,22 @@ ModelFit::Turned turned_fit(Problem& problem, const Compared& data, bool matte) 
   return far.error < kWorthFarther * near.error - kTurnFrom ? far : near;
 }
 
+/// Sets the parameters that no formula reads under these choices to their defaults.
+void reset_unread(const Model& model, ParamValues& values) {
+  ParamValues choices;
+  for (const ParamInfo& p : model.info().params)
+    if (p.kind == ParamKind::Choice) choices[p.name] = values.at(p.name);
+  if (choices.empty()) return;
+  Recorder recorder(Precision::Double);
+  const std::unique_ptr<Brdf<Expr>> brdf = model.record(choices);
+  Program light;
+  light.output("f", brdf->eval(input3("wi"), input3("wo")));
+  if (model.has_mirror()) light.output("mirror", brdf->mirror(input3("wo")));
+  const auto read = light.inputs();
+  for (const auto& [name, value] : complete(model.info(), {}))
+    if (!choices.count(name) && std::ranges::find(read, name) == read.end()) values[name] = value;
+}
+
 std::optional<ModelFit> fit_model(const Model& model, const Compared& data, Matte allowed) {
   const auto start = std::chrono::steady_clock::now();
   const ModelInfo& info = model.info();
@@ -270,6 +287,7 @@ std::optional<ModelFit> fit_model(const Model& model, const Compared& data, Matt
     const ModelFit::Turned turned = turned_fit(problem, data, best->matte.has_value());
     if (turned.error < kWorthTurn * best->error) best->turned = turned;
   }
+  reset_unread(model, best->values);
   best->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return best;
 }

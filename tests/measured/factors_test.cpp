@@ -55,6 +55,17 @@ TEST(FitFactors, FacetsThatNoOtherModelHereIsAreFound) {
     EXPECT_LT(fitted(std::make_shared<Ggx>(alpha)).error, 0.01) << alpha;
 }
 
+TEST(FitModels, ParametersThatTheChoicesLeaveUnreadHaveTheirDefaults) {
+  Measurement m;
+  m.file = "made";
+  m.isotropic = true;
+  m.table = std::make_shared<Ggx>(0.3);
+  const auto fits = fit_models(m, MeasuredModel(m), {&find_model("microfacet")}, Matte::Added);
+  ASSERT_EQ(fits.size(), 1u);
+  ASSERT_NE(std::get<std::string>(fits[0].values.at("distribution")), "multiscatter_ggx");
+  EXPECT_EQ(fits[0].values.at("again"), (ParamValue{std::array<double, 3>{1, 1, 1}}));
+}
+
 TEST(FitFactors, ColouredCurvesAreFound) {
   const Part made{"factors",
                   {"rho=0.1,0.2,0.05", "ax=0.13", "ay=0.13", "strength=0.7", "d1=0.9,0.8,0.6", "d3=0.6,0.5,0.3",
