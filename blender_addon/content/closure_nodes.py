@@ -53,10 +53,9 @@ def _wired(w, data, normal, parameters, title):
     given = {n: within(w, v, *data["bounds"].get(n, (None, None))) for n, v in parameters.items()}
     given["wo_z"] = w.vector("DOT_PRODUCT", normal, viewer, output="Value")
     found = Parts(w, data["parts"], title, {}).add("closures", **given)
-    shaders, albedo = [], None
+    shaders = []
     for closure in data["closures"]:
         color = found[closure["weight"]]
         roughness = found[closure["roughness"]] if "roughness" in closure else 0.0
         shaders.append(w.bsdf(closure["kind"], color, normal, roughness))
-        albedo = color if albedo is None else w.vector("ADD", albedo, color)
-    return {"BSDF": w.sum(shaders), "Albedo": albedo}
+    return {"BSDF": w.sum(shaders), "Albedo": found["albedo"]}

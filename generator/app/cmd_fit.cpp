@@ -94,7 +94,8 @@ void add_fit_command(Command app) {
     const ParamValues asked = values;
     if (o->store && o->twin) {
       if (!o->values.empty() || !o->over.empty() || !o->any.empty())
-        input_error("fit: --twin --store keeps the twin that the extension has: expected no values, --over and --any");
+        input_error(
+            "fit: --twin --store keeps the twin that the extension has: expected neither values nor --over nor --any");
       if (stand_in(model)) {
         fmt::print(stderr, "{}: its twin has no tables to store\n", o->model);
         return;
@@ -104,6 +105,17 @@ void add_fit_command(Command app) {
       const fit::Twin twin(model, values, fit::Twin::From::Scratch);
       twin.store(model, values);
       print_errors(twin.errors(), twin.axis() ? twin.axis()->parameter : "", o->model);
+      return;
+    }
+    if (o->twin && stand_in(model)) {
+      if (!o->over.empty() || !o->any.empty())
+        input_error("fit: --twin: {}: its twin follows all parameters: expected neither --over nor --any", o->model);
+      if (o->pairs)
+        print_f_cos([&](const Vec3<double>& wi, const Vec3<double>& wo) {
+          return evaluate(stand_in(model)->bound(model.info(), values, wo), wi, wo);
+        });
+      else
+        print_errors(forms::stand_in_errors(model, values), "", o->model + " " + format_values(model.info(), values));
       return;
     }
     if (o->store && o->over.empty()) input_error("fit: --store: expected --over or --twin beside it");
@@ -136,17 +148,6 @@ void add_fit_command(Command app) {
       return o->model + " " +
              format_values(model.info(), o->over.empty() ? values : fit::along_axis(model, values).values);
     };
-    if (o->twin && stand_in(model)) {
-      if (!o->over.empty() || !o->any.empty())
-        input_error("fit: --twin: {}: its twin follows all parameters: expected neither --over nor --any", o->model);
-      if (o->pairs)
-        print_f_cos([&](const Vec3<double>& wi, const Vec3<double>& wo) {
-          return evaluate(stand_in(model)->bound(model.info(), values, wo), wi, wo);
-        });
-      else
-        print_errors(forms::stand_in_errors(model, values), "", label());
-      return;
-    }
     if (const auto reason = fit::unfit(model, values)) input_error("{}: has no fitted form: {}", o->model, *reason);
     const auto print = [&](const auto& form, const auto& closures) {
       if (o->pairs)

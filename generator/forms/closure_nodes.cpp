@@ -40,7 +40,14 @@ Shader write_closures(const Model& model, const Setting& setting) {
     closures = Json::array();
     Program& program = programs.emplace_back();
     const ClosureSum<Expr> sum = stand_in(model)->record(info, values, input3("wo"));
-    for (std::size_t i = 0; i < sum.size(); ++i) closures.push_back(record_closure(sum[i], i, program));
+    Rgb<Expr> albedo(Expr(0.0));
+    for (std::size_t i = 0; i < sum.size(); ++i) {
+      closures.push_back(record_closure(sum[i], i, program));
+      albedo += has_facets(sum[i].kind)
+                    ? sum[i].weight * facet_albedo(sum[i].alpha, maximum(Expr::input("wo_z"), Expr(0.0)))
+                    : sum[i].weight;
+    }
+    program.output("albedo", albedo);
   }
   const print::NodeProgram made = print::node_program(selected_by_choices(info, setting.fixed, programs), {});
   Shader out;

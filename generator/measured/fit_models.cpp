@@ -11,11 +11,11 @@
 #include "core/sequence.h"
 #include "core/text.h"
 #include "fit/view.h"
+#include "measure/read_parameters.h"
 #include "measured/fit_factors.h"
 #include "measured/fit_problem.h"
 #include "measured/pairs.h"
 #include "model/choices.h"
-#include "trace/program.h"
 
 namespace brdfc::measured {
 namespace {
@@ -188,14 +188,9 @@ void reset_unread(const Model& model, ParamValues& values) {
   for (const ParamInfo& p : model.info().params)
     if (p.kind == ParamKind::Choice) choices[p.name] = values.at(p.name);
   if (choices.empty()) return;
-  Recorder recorder(Precision::Double);
-  const std::unique_ptr<Brdf<Expr>> brdf = model.record(choices);
-  Program light;
-  light.output("f", brdf->eval(input3("wi"), input3("wo")));
-  if (model.has_mirror()) light.output("mirror", brdf->mirror(input3("wo")));
-  const auto read = light.inputs();
+  const std::set<std::string> read = measure::read_parameters(model, choices);
   for (const auto& [name, value] : complete(model.info(), {}))
-    if (!choices.count(name) && std::ranges::find(read, name) == read.end()) values[name] = value;
+    if (!choices.count(name) && !read.count(name)) values[name] = value;
 }
 
 std::optional<ModelFit> fit_model(const Model& model, const Compared& data, Matte allowed) {

@@ -44,6 +44,27 @@ TEST(StandIn, OfCurvesThatAreGgxIsGgx) {
       EXPECT_TRUE(view.cos_theta_o < 0.9 || view.relative_l1 < 0.02) << a << " " << view.cos_theta_o;
 }
 
+TEST(StandIn, AlbedoOfFacetsIsThatOfTheClosure) {
+  for (const double alpha : {0.05, 0.3, 0.7, 1.0})
+    for (const double height : {0.1, 0.4, 0.8, 1.0}) {
+      const Vec3<double> wo = direction(height, 0);
+      // Over half vectors, whose density is D (n.h): slopes at equal steps of their distribution.
+      constexpr int kSteps = 200;
+      double albedo = 0;
+      for (int i = 0; i < kSteps; ++i)
+        for (int j = 0; j < kSteps; ++j) {
+          const double u = (i + 0.5) / kSteps, slope = alpha * std::sqrt(u / (1 - u)), phi = kPi * (j + 0.5) / kSteps;
+          const Vec3<double> h = normalize(Vec3<double>{slope * std::cos(phi), slope * std::sin(phi), 1});
+          const double oh = dot(wo, h);
+          const Vec3<double> wi = h * (2 * oh) - wo;
+          if (!(oh > 0 && wi.z > 0)) continue;
+          const double D = kInvPi * sqr(1 - u) / (sqr(alpha) * sqr(sqr(h.z)));
+          albedo += microfacet(ClosureKind::Ggx, alpha, alpha, wi, wo) * 4 * oh / (D * h.z) / sqr(kSteps);
+        }
+      EXPECT_NEAR(facet_albedo(alpha, height), albedo, height < 0.2 ? 0.07 : 0.03) << alpha << " " << height;
+    }
+}
+
 /// A fit's values are not the defaults, so the extension must not state the error that the form has at these.
 TEST(StandIn, StatesTheErrorOfItsValuesOnly) {
   const Model& m = find_model("factors");
