@@ -198,6 +198,10 @@ class Fitting(ToolJob):
         if not path:
             raise MeasuredError(say("Expected a file with a measured BRDF, got none"))
         self._path = Path(bpy.path.abspath(str(path)))
+        if self._path.is_dir():
+            raise MeasuredError(
+                say("{file} is a folder: New Measured Library reads all files in one", file=path)
+            )
         if not self._path.is_file():
             raise MeasuredError(say("There is no file {file}", file=path))
         super().__init__()

@@ -10,6 +10,7 @@ nodes for ideal reflection and refraction.
 import math
 
 from . import formula_lamps, svm_constants
+from .closure_nodes import within
 from .part_groups import Parts, add_group, make_group
 from .wiring import Wiring
 
@@ -124,15 +125,6 @@ def _direction(w, u, v):
     return w.combine(x, y, height)
 
 
-def _within(w, parameter, low, high):
-    """A parameter within its bounds, as a link may give it any value; None is no bound."""
-    for operation, bound in (("MAXIMUM", low), ("MINIMUM", high)):
-        if bound is not None:
-            compute = w.vector if isinstance(bound, list) else w.math
-            parameter = compute(operation, parameter, bound)
-    return parameter
-
-
 def wire(tree, data, normal, tangent, parameters, outputs_of_slots, cones, title):
     """Adds a model's nodes as a group. Returns the outputs by name: the BSDF, and the Albedo where
     the model consists of Blender's own closures only.
@@ -174,7 +166,7 @@ def _wired(w, data, normal, tangent, parameters, of_slots, cones, title):
     lists = {name: svm_constants.prepared(name, part) for name, part in data["parts"].items()}
     parts = Parts(w, lists, title, constants)
     bounds = {name: data["bounds"].get(name, (None, None)) for name in parameters}
-    parameters = {name: _within(w, value, *bounds[name]) for name, value in parameters.items()}
+    parameters = {name: within(w, value, *bounds[name]) for name, value in parameters.items()}
     surface = _Surface(w, parts, geometry, normal, None if data["isotropic"] else tangent)
     side = w.math("MULTIPLY_ADD", surface.backfacing, -2.0, 1.0)
     given = {**parameters, **surface.wo, "side": side, "path_length": surface.path_length}
@@ -208,8 +200,8 @@ def _wired(w, data, normal, tangent, parameters, of_slots, cones, title):
     # All closures of a shading point are sampled with the same numbers: they are added up, so they
     # need not be independent.
     given |= {f"u_{i}": number for i, number in enumerate(surface.drawn)}
+    given |= parts.add("once", **given)
     if of_slots:
-        given |= parts.add("once", **given)
         given["anywhere"] = surface.anywhere
         frame = zip(("tangent", "bitangent", "normal"), surface.axes, strict=True)
         here = {"at": surface.place, "view": surface.view, "true": surface.true_normal}
@@ -247,7 +239,11 @@ def _rest(w, parts, surface, given, lamps, narrow):
     """The closure of the sampled direction, which carries all light that the lamps' closures do
     not."""
     drawn = parts.add("draw", **given)
-    ray = surface.world(drawn["wi"])
+    ray, here = surface.world(drawn["drawn"]), given | {"wi": drawn["drawn"]}
+    if "weight" not in drawn:
+        at = parts.add("value", **here)
+    elif lamps:
+        at = parts.add("density", **here)
     height = w.vector("DOT_PRODUCT", ray, surface.true_normal, output="Value")
     # Rays can leave hairs in every direction.
     hidden = w.math(
@@ -256,15 +252,15 @@ def _rest(w, parts, surface, given, lamps, narrow):
     # From the last slot to the first, as formula_lamps decides which are shown.
     met = 0.0
     if lamps:
-        here = {"at": surface.place, "ray": ray}
-        here |= parts.add("density", **given | {"wi": drawn["wi"]})
+        here = {"at": surface.place, "ray": ray, "density": at["density"]}
     for lamp in reversed(lamps):
         seen = here | lamp
         inside = parts.add("met", **seen | parts.add("lit", **seen))["met"]
         met = w.math("MAXIMUM", met, w.math("MULTIPLY", inside, lamp["shown"]))
     lost = w.math("MAXIMUM", hidden, met)
     chance = w.math("FRACT", w.math("MULTIPLY", given["u_0"], 4096.0))
-    colour = parts.add("rest", weight=drawn["weight"], u=chance, lost=lost)["color"]
+    weight = {"value": drawn["weight"], "density": 1.0} if "weight" in drawn else at
+    colour = parts.add("rest", **weight, u=chance, lost=lost)["color"]
     size = narrow * 2 / math.pi
     return w.toon(colour, size, w.half(ray, surface.view))
 

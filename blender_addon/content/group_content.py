@@ -10,7 +10,7 @@ from .. import lamps
 from ..common.i18n import say
 from ..packs import pack
 from ..packs.parameter_values import choice_label
-from . import compiler, formula_nodes, part_groups, stand_in, twin
+from . import closure_nodes, compiler, formula_nodes, part_groups, stand_in, twin
 from .compiler import CompileError
 from .group_sockets import VECTORS, Interface, has_menus
 from .wiring import Wiring
@@ -148,9 +148,9 @@ def fill_with_nodes(group, form, source, twin_group, room=lamps.WHOLE):
     parameters = _relays(group, interface, form.socket_parameters)
     normal, tangent = map(interface.vector, VECTORS)
     if is_twin:
-        made = dict(
-            zip(OUTPUTS, twin.wire(group, data, normal, parameters, f"{label} (twin)"), strict=True)
-        )
+        wire = closure_nodes.wire if closure_nodes.has_formulas(data) else twin.wire
+        found = wire(group, data, normal, parameters, f"{label} (twin)")
+        made = dict(zip(OUTPUTS, found, strict=True))
     else:
         of_slots = []
         if names := _lamp_inputs(form, room):

@@ -18,7 +18,7 @@ VARYING = {
     "draw": ("wo", "u_0", "u_1", "u_2"),
     "lobe": ("value", "u_2"),
     "raise": ("wo",),
-    "rest": ("weight", "u", "lost"),
+    "rest": ("value", "density", "u", "lost"),
     "value": ("wi", "wo"),
 }
 

@@ -336,6 +336,14 @@ class Form:
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
+def error_at(entry, values):
+    """The measured error of a form, as its entry of a manifest has it, for these values of the
+    parameters; empty if it is known for other values only."""
+    known = canonical(entry["error"].get("at") or {})
+    same = all(equal_in_float32(values.get(key), value) for key, value in known.items())
+    return entry["error"] if same else {}
+
+
 def _text_of(relative):
     """Stem and text of a file of the pack."""
     path = root / relative

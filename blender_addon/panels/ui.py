@@ -98,9 +98,8 @@ def draw_material_menu(self, context):
     self.layout.operator("brdfc.add_coat", icon="NODE_MATERIAL")
 
 
-def error_text(entry):
+def error_text(error):
     """The measured error of a form in a few words."""
-    error = entry["error"]
     if (off := error.get("relative_l1")) is not None:
         return percent(off)
     # The form samples directions: the measurement shows that no energy is lost.
@@ -109,12 +108,12 @@ def error_text(entry):
     return say("not measured")
 
 
-def error_line(form):
+def error_line(node, form):
     """The same for the panel, with the quantity that it is a fraction of."""
-    error = error_text(form)
-    if (form["error"].get("relative_l1") or 0) < ROUNDING:
-        return say("Error: {error}", error=error)
-    return say("Error: {error} of the light", error=error)
+    error = pack.error_at(form, model_nodes.all_values(node))
+    if (error.get("relative_l1") or 0) < ROUNDING:
+        return say("Error: {error}", error=error_text(error))
+    return say("Error: {error} of the light", error=error_text(error))
 
 
 def percent(part):
@@ -130,7 +129,7 @@ ROUNDING = 1e-5
 
 def details(node, form):
     """What the panel omits about a node's form, one sentence per line."""
-    error = form["error"]
+    error = pack.error_at(form, model_nodes.all_values(node))
     out = [
         say("{what}: {error}", what=what, error=percent(error[key]))
         for key, what in (
@@ -234,7 +233,7 @@ def _draw_form(layout, node, form, scene, changes):
     line.alignment = "LEFT"
     line.operator(
         "brdfc.details",
-        text=iface(error_line(form)),
+        text=iface(error_line(node, form)),
         translate=False,
         icon="QUESTION",
         emboss=False,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Evaluates the nodes of a twin on NumPy arrays, to find what its group scatters.
 
-Only nodes that twin.py uses are supported; a file may contain others.
+Only nodes that twin.py and closure_nodes.py use are supported; a file may contain others.
 """
 
 import numpy as np
@@ -14,7 +14,10 @@ _MATH = {
     "ADD": np.add,
     "SUBTRACT": np.subtract,
     "MULTIPLY": np.multiply,
+    "DIVIDE": np.divide,
     "MULTIPLY_ADD": lambda x, y, z: x * y + z,
+    "EXPONENT": np.exp,
+    "SQRT": np.sqrt,
     "LOGARITHM": lambda x, base: np.log(x) / np.log(base),
     "MINIMUM": np.minimum,
     "MAXIMUM": np.maximum,
@@ -24,6 +27,10 @@ _VECTORS = {
     "ADD": np.add,
     "SUBTRACT": np.subtract,
     "MULTIPLY": np.multiply,
+    "DIVIDE": np.divide,
+    "MULTIPLY_ADD": lambda x, y, z: x * y + z,
+    "MINIMUM": np.minimum,
+    "MAXIMUM": np.maximum,
     "SCALE": np.multiply,
     "DOT_PRODUCT": lambda x, y: (x * y).sum(0),
     "CROSS_PRODUCT": lambda x, y: np.cross(x, y, axis=0),
@@ -59,8 +66,8 @@ class _Execution:
     inputs by identifier. Vectors have their components first; the value of a shader is Lobes."""
 
     def __init__(self, group, given, wo):
-        self._given, self._wo = given, wo
-        self._pictures = {}
+        self._nodes, self._given, self._wo = group.nodes, given, wo
+        self._pictures, self._groups = {}, {}
         # NodeSocket.links searches all links of the tree, so a dictionary is built once.
         self._sources = {
             link.to_socket.as_pointer(): link.from_socket
@@ -87,7 +94,19 @@ class _Execution:
         return compute(node, socket)
 
     def _nodegroupinput(self, node, socket):
-        return _constant(self._given[socket.identifier])
+        return self._given[socket.identifier]
+
+    def _group(self, node, socket):
+        key = node.as_pointer()
+        if key not in self._groups:
+            given = {s.identifier: self.value(s) for s in node.inputs}
+            self._groups[key] = _Execution(node.node_tree, given, self._wo)
+        return self._groups[key].output(socket.name)
+
+    def output(self, name):
+        """The value of an output of the group."""
+        (end,) = (node for node in self._nodes if node.bl_idname == "NodeGroupOutput")
+        return self.value(end.inputs[name])
 
     def _nodereroute(self, node, socket):
         return self.value(node.inputs[0])
@@ -103,6 +122,13 @@ class _Execution:
 
     def _combinexyz(self, node, socket):
         return shader_text.vector(*(self.value(s) for s in node.inputs))
+
+    def _separatexyz(self, node, socket):
+        return self.value(node.inputs[0])["XYZ".index(socket.name)]
+
+    def _mix(self, node, socket):
+        factor, at_0, at_1 = (self.value(s) for s in node.inputs if s.enabled)
+        return at_0 * (1 - factor) + at_1 * factor
 
     def _separatecolor(self, node, socket):
         return self.value(node.inputs["Color"])[("Red", "Green", "Blue").index(socket.name)]
@@ -151,8 +177,8 @@ def lobes(group, given, wo):
     and colours by the identifiers of the group's inputs. This function and the Lobes it returns
     raise Unreadable."""
     try:
-        (end,) = (node for node in group.nodes if node.bl_idname == "NodeGroupOutput")
-        found = _Execution(group, given, np.transpose(wo)[:, :, None]).value(end.inputs["BSDF"])
+        given = {identifier: _constant(value) for identifier, value in given.items()}
+        found = _Execution(group, given, np.transpose(wo)[:, :, None]).output("BSDF")
     except shader_text.FAILURES as error:
         raise Unreadable(str(error)) from error
     if not isinstance(found, Lobes):

@@ -34,10 +34,10 @@ def _by_twin(finding, ours):
 
 def _twin_error(node):
     """Error of a node's twin; None if it is not known at the node's values."""
-    twin = twin_of(node)
-    if twin is None or twin.refusal(model_nodes.all_values(node)):
+    twin, values = twin_of(node), model_nodes.all_values(node)
+    if twin is None or twin.refusal(values):
         return None
-    return twin.entry["error"]["relative_l1"]
+    return pack.error_at(twin.entry, values).get("relative_l1")
 
 
 def scene_warnings(scene):

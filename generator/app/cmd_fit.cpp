@@ -12,7 +12,9 @@
 #include "fit/terms.h"
 #include "fit/twin.h"
 #include "fit/view.h"
+#include "forms/closure_nodes.h"
 #include "forms/form.h"
+#include "model/stand_in.h"
 #include "tables/store.h"
 
 namespace brdfc::app {
@@ -92,12 +94,28 @@ void add_fit_command(Command app) {
     const ParamValues asked = values;
     if (o->store && o->twin) {
       if (!o->values.empty() || !o->over.empty() || !o->any.empty())
-        input_error("fit: --twin --store keeps the twin that the extension has: expected no values, --over and --any");
+        input_error(
+            "fit: --twin --store keeps the twin that the extension has: expected neither values nor --over nor --any");
+      if (stand_in(model)) {
+        fmt::print(stderr, "{}: its twin has no tables to store\n", o->model);
+        return;
+      }
       values = forms::form("twin")->values(model, {});
       if (const auto reason = fit::unfit(model, values)) input_error("{}: has no twin: {}", o->model, *reason);
       const fit::Twin twin(model, values, fit::Twin::From::Scratch);
       twin.store(model, values);
       print_errors(twin.errors(), twin.axis() ? twin.axis()->parameter : "", o->model);
+      return;
+    }
+    if (o->twin && stand_in(model)) {
+      if (!o->over.empty() || !o->any.empty())
+        input_error("fit: --twin: {}: its twin follows all parameters: expected neither --over nor --any", o->model);
+      if (o->pairs)
+        print_f_cos([&](const Vec3<double>& wi, const Vec3<double>& wo) {
+          return evaluate(stand_in(model)->bound(model.info(), values, wo), wi, wo);
+        });
+      else
+        print_errors(forms::stand_in_errors(model, values), "", o->model + " " + format_values(model.info(), values));
       return;
     }
     if (o->store && o->over.empty()) input_error("fit: --store: expected --over or --twin beside it");

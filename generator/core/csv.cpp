@@ -44,14 +44,29 @@ std::vector<std::string> split_header(const std::string& line) {
   return fields;
 }
 
+std::optional<std::string> comment_of(const std::string& line) {
+  const std::string text = trim(line.starts_with("\xEF\xBB\xBF") ? line.substr(3) : line);
+  if (!text.starts_with('#')) return std::nullopt;
+  return text.substr(std::min(text.find_first_not_of('#'), text.size()));
+}
+
 CsvReader::CsvReader(std::istream& in, std::string source, std::vector<std::string> columns)
     : in_(in), source_(std::move(source)), columns_(std::move(columns)) {
   std::string line;
-  if (!read_line(line)) {
-    line_ = 0;
-    return;
-  }
-  const std::vector<std::string> header = split_header(line);
+  std::vector<std::string> header;
+  const auto is_header = [&] {
+    const std::optional<std::string> comment = comment_of(line);
+    header = split_header(comment.value_or(line));
+    return !comment || std::ranges::any_of(columns_, [&](const std::string& c) {
+      return std::find(header.begin(), header.end(), c) != header.end();
+    });
+  };
+  do {
+    if (!read_line(line)) {
+      line_ = 0;
+      return;
+    }
+  } while (!is_header());
   fields_ = header.size();
   const auto separated_by = [&](char c) { return fields_ == 1 && header[0].find(c) != std::string::npos; };
   for (const auto& [separator, title] : {std::pair(';', "semicolons"), std::pair('\t', "tabs")})
@@ -82,7 +97,9 @@ bool CsvReader::read_line(std::string& line) {
 
 bool CsvReader::next(std::vector<double>& row) {
   std::string line;
-  if (!read_line(line)) return false;
+  do {
+    if (!read_line(line)) return false;
+  } while (comment_of(line));
   const std::vector<std::string> fields = split_fields(line);
   if (fields.size() != fields_)
     input_error("{}: expected {} values as in the header, got {}", where(), fields_, fields.size());

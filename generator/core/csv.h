@@ -6,6 +6,7 @@
 
 #include <cstdio>
 #include <istream>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,9 +23,14 @@ std::vector<std::string> split_fields(const std::string& line);
 /// begin a file in UTF-8.
 std::vector<std::string> split_header(const std::string& line);
 
+/// The text after the sign # if a line begins with it, otherwise nothing.
+std::optional<std::string> comment_of(const std::string& line);
+
 /// Reads numbers from named columns. The columns may come in any order, and other columns are ignored, so that the
-/// output of one command can be the input of the next. Capitals in their names do not matter. Every error is an
-/// InputError that names line, column and what was expected. Numbers must be finite.
+/// output of one command can be the input of the next. Capitals in their names do not matter. Lines that begin with #
+/// are comments; before the first other line, one that has the name of a column is the header, as programs write it
+/// that read tables without one. Every error is an InputError that names line, column and what was expected. Numbers
+/// must be finite.
 class CsvReader {
  public:
   /// Reads the header. For an input without any line empty() is true; only the caller can tell whether that is an
@@ -33,7 +39,8 @@ class CsvReader {
   bool empty() const { return line_ == 0; }
   /// The names of other columns, which are ignored.
   const std::vector<std::string>& others() const { return others_; }
-  /// Reads the next line's numbers, in the order of `columns`. Returns false at the end. Blank lines are skipped.
+  /// Reads the next line's numbers, in the order of `columns`. Returns false at the end. Blank lines and comments are
+  /// skipped.
   bool next(std::vector<double>& row);
   /// The place of the row read last, for messages: "stdin line 7".
   std::string where() const;

@@ -8,9 +8,11 @@ namespace brdfc::inline core {
 
 /// e^x - 1 to 1e-7. exp_x is e^x.
 template <class T> T series_expm1(const T& x, const T& exp_x) {
+  // A selection may multiply the branch that is not taken by 0, so the series has to be finite everywhere.
+  const T y = minimum(maximum(x, T(-0.5)), T(0.5));
   const T sum =
-      x * (T(1) +
-           x * (T(1 / 2.) + x * (T(1 / 6.) + x * (T(1 / 24.) + x * (T(1 / 120.) + x * (T(1 / 720.) + x / T(5040)))))));
+      y * (T(1) +
+           y * (T(1 / 2.) + y * (T(1 / 6.) + y * (T(1 / 24.) + y * (T(1 / 120.) + y * (T(1 / 720.) + y / T(5040)))))));
   return select(abs(x) < T(0.4), sum, exp_x - T(1));
 }
 

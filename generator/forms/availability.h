@@ -29,7 +29,7 @@ class Availability {
   /// True if its closures may be the base of an aimed form (AimedBase::Fitted).
   virtual bool gives_base() const { return false; }
   /// True if parameters of this role need no fixed value.
-  virtual bool serves(fit::Role) const { return true; }
+  virtual bool serves(const Model&, fit::Role) const { return true; }
   /// Values that the form requires in addition to the fixed ones.
   virtual ParamValues values(const Model&, const ParamValues& /*fixed*/) const { return {}; }
   /// The reason, as a clause, why the form does not exist for a model with these values; nullopt if it exists.

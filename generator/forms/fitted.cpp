@@ -17,7 +17,7 @@ class Fitted final : public OslForm {
   }
   bool made_of_fit() const override { return true; }
   bool gives_base() const override { return true; }
-  bool serves(fit::Role role) const override { return role != fit::Role::Open; }
+  bool serves(const Model&, fit::Role role) const override { return role != fit::Role::Open; }
   ParamValues values(const Model& model, const ParamValues& fixed) const override {
     return values_of_fit(model, fixed);
   }
@@ -30,7 +30,7 @@ class Fitted final : public OslForm {
   }
   FormError error(const Model& model, const Setting& setting) const override {
     const fit::Fit fit = fit::fit_of(model, setting.fixed, setting.views);
-    return error_of_fit(fit.errors(), "closures", fit.axis());
+    return error_of_fit(fit.errors(), "closures fitted to the model", fit.axis());
   }
   std::optional<double> off_by(const Model& model, const Setting& setting,
                                const std::optional<double>& axis) const override {

@@ -23,8 +23,8 @@ FormError error_of_fit(const std::vector<fit::ViewError>& errors, const std::str
   out.relative_l1 = sum1;
   out.relative_l2 = sum2;
   out.note =
-      fmt::format("{} fitted to the model, error at most {:.2g}, seen at a cosine of {:.2g}{}", what, worst.relative_l1,
-                  worst.cos_theta_o, axis ? fmt::format(", with {} = {:.3g}", axis->parameter, worst.number) : "");
+      fmt::format("{}, error at most {:.2g}, seen at a cosine of {:.2g}{}", what, worst.relative_l1, worst.cos_theta_o,
+                  axis ? fmt::format(", with {} = {:.3g}", axis->parameter, worst.number) : "");
   return out;
 }
 

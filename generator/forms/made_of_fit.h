@@ -11,7 +11,7 @@
 namespace brdfc::forms {
 
 /// Averages the errors of the views. They are computed in double precision; single precision adds only rounding. `what`
-/// names what was fitted, `axis` is the parameter that the errors run over.
+/// says what the errors are of, `axis` is the parameter that the errors run over.
 FormError error_of_fit(const std::vector<fit::ViewError>&, const std::string& what,
                        const std::optional<fit::FitAxis>& axis = {});
 

@@ -18,6 +18,7 @@ struct FormError {
   std::optional<double> relative_l2;  ///< the same in the L2 norm
   double albedo = 0;                  ///< largest |albedo - quadrature|, executed in single precision
   std::string note;
+  ParamValues at = {};  ///< the error is known for these values alone, of parameters that the form leaves open
 };
 
 class Measurement {

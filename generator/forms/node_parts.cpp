@@ -49,9 +49,9 @@ void take_part(LampCone<Expr>& cone) {
 }  // namespace
 
 const std::set<std::string>& node_vectors() {
-  static const std::set<std::string> names = {"across", "aim",   "along", "at",  "away",  "axis",  "lit_place",
-                                              "normal", "other", "place", "ray", "scale", "shape", "towards",
-                                              "true",   "turn",  "view",  "wi",  "wo"};
+  static const std::set<std::string> names = {"across", "aim",   "along", "at",   "away",  "axis",  "lit_place",
+                                              "normal", "other", "place", "ray",  "scale", "shape", "towards",
+                                              "true",   "turn",  "drawn", "view", "wi",    "wo"};
   return names;
 }
 
@@ -66,6 +66,17 @@ Json json_of(const NodeProgram& program) {
   for (const auto& [name, o] : program.outputs)
     outputs.push_back({name, o.color ? "VECTOR" : "FLOAT", operand_json(o)});
   return {{"inputs", inputs}, {"operations", operations}, {"outputs", outputs}, {"live", program.live}};
+}
+
+Json bounds_json(const ModelInfo& info, const ParamValues& fixed) {
+  Json bounds = Json::object();
+  for (const ParamInfo& p : info.params) {
+    if (fixed.count(p.name)) continue;
+    const auto grey = [](double value) { return Json{value, value, value}; };
+    if (p.kind == ParamKind::Number) bounds[p.name] = {p.min, p.max};
+    if (p.kind == ParamKind::Color) bounds[p.name] = {grey(p.min), p.may_exceed ? Json() : grey(p.max)};
+  }
+  return bounds;
 }
 
 NodeProgram record_bend() {
@@ -209,7 +220,8 @@ NodeProgram record_lobe() {
 }
 NodeProgram record_rest() {
   return recorded([](Program& p) {
-    const Rgb<Expr> weight = Rgb<Expr>::input("weight") * (Expr(1.0) - Expr::input("lost"));
+    const Expr density = maximum(Expr::input("density"), tiny<Expr>());
+    const Rgb<Expr> weight = Rgb<Expr>::input("value") * ((Expr(1.0) - Expr::input("lost")) / density);
     p.output("color", weight * kept(max_component(weight), Expr::input("u")));
   });
 }

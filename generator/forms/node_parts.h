@@ -6,6 +6,7 @@
 #include <set>
 #include <string>
 
+#include "model/model.h"
 #include "print/node_program.h"
 
 namespace brdfc::forms {
@@ -13,6 +14,8 @@ namespace brdfc::forms {
 /// Names of the inputs and outputs of parts that are vectors.
 const std::set<std::string>& node_vectors();
 nlohmann::ordered_json json_of(const print::NodeProgram&);
+/// The ranges of the numbers and colours that are not fixed, by name, as links may give them any value.
+nlohmann::ordered_json bounds_json(const ModelInfo&, const ParamValues& fixed);
 
 print::NodeProgram record_bend();
 print::NodeProgram record_raise();
@@ -29,8 +32,8 @@ print::NodeProgram record_flat();
 print::NodeProgram record_beam();
 print::NodeProgram record_met();
 print::NodeProgram record_lobe();
-/// The weight of the drawn direction. `lost` is the part of its light that a lamp's closure carries, and 1 below the
-/// surface.
+/// The weight of the drawn direction, its value divided by its density. `lost` is the part of its light that a lamp's
+/// closure carries, and 1 below the surface.
 print::NodeProgram record_rest();
 
 }  // namespace brdfc::forms

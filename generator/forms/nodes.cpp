@@ -140,7 +140,8 @@ struct NodeRecording {
   Program whole;           ///< computes `others`: 0 where the base is all of the model, otherwise 1
   bool facets = false;     ///< whether the base has facets
   Program base;            ///< computes the inputs of `of_base`
-  Program value, draw;     ///< f cos - base and pdf; a drawn direction and its weight
+  /// f cos - base and its density; a direction that is drawn, and its weight if that is not the quotient of both.
+  Program sampled;
 };
 
 /// Uses the current recorder; `fixed` must contain every choice.
@@ -151,8 +152,7 @@ NodeRecording record_nodes(const Model& model, const ParamValues& fixed) {
                     .give = {},
                     .whole = {},
                     .base = {},
-                    .value = {},
-                    .draw = {}};
+                    .sampled = {}};
   const std::unique_ptr<Brdf<Expr>> brdf = model.record(fixed);
   if (std::optional<ClosureSum<Expr>> sum = native_closures(model, *brdf)) {
     out.native = true;
@@ -176,13 +176,16 @@ NodeRecording record_nodes(const Model& model, const ParamValues& fixed) {
   out.facets = std::ranges::any_of(base, [](const Closure<Expr>& c) { return has_facets(c.kind); });
   const Rgb<Expr> f = brdf->eval(wi, wo) * abs(wi.z);
   const bool has_base = !out.of_base.empty();
-  out.value.output("value", base.empty() ? f : f - evaluate(base, wi, wo));
-  out.value.output("density", brdf->pdf(wi, wo));
+  out.sampled.output("value", base.empty() ? f : f - evaluate(base, wi, wo));
+  out.sampled.output("density", brdf->pdf(wi, wo));
   const Under* of = has_base ? under(model) : nullptr;
-  const Sample<Expr> s = of && of->sample ? of->sample(model.info(), fixed, wo, recorded_u(), Expr::input("stands"))
-                                          : brdf->sample(wo, recorded_u());
-  out.draw.output("wi", s.wi);
-  out.draw.output("weight", base.empty() ? s.weight : s.weight - evaluate(base, s.wi, wo) / s.pdf);
+  if (of && of->sample) {
+    const Sample<Expr> s = of->sample(model.info(), fixed, wo, recorded_u(), Expr::input("stands"));
+    out.sampled.output("drawn", s.wi);
+    out.sampled.output("weight", s.weight - evaluate(base, s.wi, wo) / s.pdf);
+  } else {
+    out.sampled.output("drawn", brdf->sample(wo, recorded_u()).wi);
+  }
   if (model.has_mirror()) {
     out.give.output("weight_0", brdf->mirror(wo));
     out.closures.push_back({{"kind", "mirror"}, {"weight", "weight_0"}});
@@ -197,8 +200,7 @@ std::optional<std::string> obstacle(const Model& model, const ParamValues& fixed
   if (r.native) return std::nullopt;
   if (measure::two_sided(model, *model.record(fixed)))
     return "Blender's nodes can't send rays through a surface in a direction of their own";
-  for (const Program* p : {&r.value, &r.draw})
-    if (!print::has_nodes(*p)) return "Blender's nodes have no tables of several numbers";
+  if (!print::has_nodes(r.sampled)) return "Blender's nodes have no tables of several numbers";
   return std::nullopt;
 }
 
@@ -219,12 +221,22 @@ std::vector<std::pair<const char*, NodeProgram>> record_parts(const Model& model
   if (first.native) return out;
   if (!first.of_base.empty()) add("base", &NodeRecording::base);
   if (has_whole(model)) add("whole", &NodeRecording::whole);
-  const print::NodePrograms made = print::node_programs(program(&NodeRecording::value), {"wi_x", "wi_y", "wi_z"},
-                                                        "kept_", node_vectors(), {"density"});
+  const Program sampled = program(&NodeRecording::sampled);
+  const bool weighs =
+      std::ranges::any_of(sampled.outputs(), [](const auto& o) { return o.first.starts_with("weight"); });
+  const std::set<std::string> varying = {"wi_x", "wi_y", "wi_z", "u_0", "u_1", "u_2"};
+  const auto three = [](const std::string& name) {
+    return std::set<std::string>{name, name + "_x", name + "_y", name + "_z"};
+  };
+  std::set<std::string> value = three("value"), draw = three("drawn");
+  value.insert("density");
+  draw.merge(three("weight"));
+  const print::NodePrograms made =
+      print::node_programs(sampled, varying, "kept_", {value, draw, {"density"}}, node_vectors());
   out.push_back({"once", made.once});
-  out.push_back({"value", made.each});
-  out.push_back({"density", made.some});  // of the drawn direction, whichever choice drew it
-  add("draw", &NodeRecording::draw);
+  out.push_back({"value", made.each[0]});
+  out.push_back({"draw", made.each[1]});
+  if (weighs) out.push_back({"density", made.each[2]});  // of the drawn direction
   return out;
 }
 std::vector<NodeRecording> record_combinations(const Model& model, const ParamValues& fixed) {
@@ -348,17 +360,11 @@ class Nodes final : public Form {
 Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_lamps) {
   Shader out;
   out.name = fmt::format("brdfc_{}_nodes", model.info().name);
-  Json parts = Json::object(), bounds = Json::object();
+  Json parts = Json::object();
   const auto add = [&](const char* name, const NodeProgram& program) {
     parts[name] = json_of(program);
     out.operations += int(program.operations.size());
   };
-  for (const ParamInfo& p : model.info().params) {
-    if (fixed.count(p.name)) continue;
-    const auto grey = [](double value) { return Json{value, value, value}; };
-    if (p.kind == ParamKind::Number) bounds[p.name] = {p.min, p.max};
-    if (p.kind == ParamKind::Color) bounds[p.name] = {grey(p.min), p.may_exceed ? Json() : grey(p.max)};
-  }
   if (model.info().look != Look::Matte) add("bend", record_bend());
   add("raise", record_raise());
   Recorder recorder;
@@ -390,7 +396,7 @@ Shader Nodes::write_nodes(const Model& model, const ParamValues& fixed, int max_
                     {"narrow", kNarrow},
                     {"widest", kWidestWidened},
                     {"lamps", out.lamps},
-                    {"bounds", bounds},
+                    {"bounds", bounds_json(model.info(), fixed)},
                     {"closures", first.closures},
                     {"base", first.of_base},
                     {"parts", parts}};

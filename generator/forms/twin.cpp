@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The twin: a material of Blender's own nodes, without a shader, that approximates the model along one parameter
-// (fit/twin.h).
+// (fit/twin.h), or at any parameters if the model declares how (model/stand_in.h).
 #include "fit/twin.h"
 
 #include <fmt/format.h>
@@ -10,7 +10,9 @@
 
 #include "core/json_text.h"
 #include "fit/roles.h"
+#include "forms/closure_nodes.h"
 #include "forms/made_of_fit.h"
+#include "model/stand_in.h"
 
 namespace brdfc::forms {
 namespace {
@@ -78,29 +80,35 @@ class Twin final : public Form {
   Twin() : Form("twin") {}
 
   When when() const override { return When::Asked; }
-  bool in_whole_pack(const Model& model) const override { return !fit::unfit(model, values_of_fit(model, {})); }
+  bool in_whole_pack(const Model& model) const override {
+    return stand_in(model) || !fit::unfit(model, values_of_fit(model, {}));
+  }
   bool made_of_fit() const override { return true; }
-  bool serves(fit::Role role) const override { return role != fit::Role::Open; }
+  bool serves(const Model& model, fit::Role role) const override { return stand_in(model) || role != fit::Role::Open; }
   ParamValues values(const Model& model, const ParamValues& fixed) const override {
-    return values_of_fit(model, fixed);
+    return stand_in(model) ? ParamValues{} : values_of_fit(model, fixed);
   }
   std::optional<std::string> why_not(const Model& model, const ParamValues& fixed) const override {
-    return fit::unfit(model, fixed);
+    return stand_in(model) ? std::nullopt : fit::unfit(model, fixed);
   }
 
   bool native() const override { return true; }
   FormError error(const Model& model, const Setting& setting) const override {
+    if (stand_in(model)) return error_of_stand_in(model, setting.fixed);
     const fit::Twin& twin = fit::twin_of(model, setting.fixed);
-    return error_of_fit(twin.errors(), "Blender's nodes", twin.axis());
+    return error_of_fit(twin.errors(), "Blender's nodes fitted to the model", twin.axis());
   }
   std::optional<fit::FitAxis> axis(const Model& model, const Setting& setting) const override {
-    return fit::twin_of(model, setting.fixed).axis();
+    return stand_in(model) ? std::nullopt : fit::twin_of(model, setting.fixed).axis();
   }
-  void prepare(const Model& model, const Setting& setting) const override { fit::twin_of(model, setting.fixed); }
+  void prepare(const Model& model, const Setting& setting) const override {
+    if (!stand_in(model)) fit::twin_of(model, setting.fixed);
+  }
 
   Shader write(const Model&, const measure::AlbedoTable&, const Setting& = {}) const override;
   std::vector<std::string> warnings(const Model& model, const Shader&) const override {
     // It consists of a Diffuse node, Glossy nodes with tilted normals, and a mirror.
+    if (stand_in(model)) return {"caustics", "filter_glossy"};
     if (!model.has_mirror()) return {"leaning_facets", "caustics", "filter_glossy"};
     return {"multiple_importance", "leaning_facets", "caustics", "filter_glossy", "clamp_mirror"};
   }
@@ -113,6 +121,7 @@ class Twin final : public Form {
 /// channel if `tint` multiplies it. `terms` says how the `mixed` parameters give the weights of the terms,
 /// `mirror_terms` the same for a mirror. Factors multiply all weights except a mirror's.
 Shader Twin::write(const Model& model, const measure::AlbedoTable&, const Setting& setting) const {
+  if (stand_in(model)) return write_closures(model, setting);
   const fit::Twin& twin = fit::twin_of(model, setting.fixed);
   Shader out;
   out.name = fmt::format("brdfc_{}_twin", model.info().name);

@@ -31,12 +31,13 @@ const std::vector<std::string>& names_of(Columns columns) {
 /// What the first column of a table of its kind says; angles where there is none.
 Columns columns_of(const std::string& text) {
   std::istringstream in(text);
-  std::string line;
-  while (trim(line).empty() && std::getline(in, line)) {
+  for (std::string line; std::getline(in, line);) {
+    const std::optional<std::string> comment = comment_of(line);
+    const auto header = split_header(comment.value_or(line));
+    for (const Columns c : {Columns::Vectors, Columns::Degrees, Columns::Radians})
+      if (std::find(header.begin(), header.end(), names_of(c)[0]) != header.end()) return c;
+    if (!comment && !trim(line).empty()) break;
   }
-  const auto header = split_header(line);
-  for (const Columns c : {Columns::Vectors, Columns::Degrees, Columns::Radians})
-    if (std::find(header.begin(), header.end(), names_of(c)[0]) != header.end()) return c;
   return Columns::Angles;
 }
 

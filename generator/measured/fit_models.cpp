@@ -11,6 +11,7 @@
 #include "core/sequence.h"
 #include "core/text.h"
 #include "fit/view.h"
+#include "measure/read_parameters.h"
 #include "measured/fit_factors.h"
 #include "measured/fit_problem.h"
 #include "measured/pairs.h"
@@ -181,6 +182,17 @@ ModelFit::Turned turned_fit(Problem& problem, const Compared& data, bool matte) 
   return far.error < kWorthFarther * near.error - kTurnFrom ? far : near;
 }
 
+/// Sets the parameters that no formula reads under these choices to their defaults.
+void reset_unread(const Model& model, ParamValues& values) {
+  ParamValues choices;
+  for (const ParamInfo& p : model.info().params)
+    if (p.kind == ParamKind::Choice) choices[p.name] = values.at(p.name);
+  if (choices.empty()) return;
+  const std::set<std::string> read = measure::read_parameters(model, choices);
+  for (const auto& [name, value] : complete(model.info(), {}))
+    if (!choices.count(name) && !read.count(name)) values[name] = value;
+}
+
 std::optional<ModelFit> fit_model(const Model& model, const Compared& data, Matte allowed) {
   const auto start = std::chrono::steady_clock::now();
   const ModelInfo& info = model.info();
@@ -270,6 +282,7 @@ std::optional<ModelFit> fit_model(const Model& model, const Compared& data, Matt
     const ModelFit::Turned turned = turned_fit(problem, data, best->matte.has_value());
     if (turned.error < kWorthTurn * best->error) best->turned = turned;
   }
+  reset_unread(model, best->values);
   best->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return best;
 }

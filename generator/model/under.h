@@ -15,6 +15,7 @@
 #include <array>
 
 #include "model/base_terms.h"
+#include "model/bound_as.h"
 #include "model/mirror_side.h"
 #include "model/model.h"
 
@@ -110,31 +111,21 @@ concept HasWhole = requires(const M& m) {
 };
 
 template <template <class> class M> Under under_of() {
-  static const auto recorded = [](const ModelInfo& info, const ParamValues& fixed) {
-    const ParamValues values = complete(info, fixed);
-    M<Expr> m;
-    m.parameters(RecordVisitor{values, fixed});
-    return m;
-  };
-  static const auto bound = [](const ModelInfo& info, const ParamValues& given) {
-    const ParamValues values = complete(info, given);
-    M<double> m;
-    m.parameters(BindVisitor<double>{values});
-    return m;
-  };
   Under out{[](const ModelInfo& info, const ParamValues& fixed, const Vec3<Expr>& wo) {
-              return recorded(info, fixed).under(wo);
+              return recorded_as<M>(info, fixed).under(wo);
             },
             [](const ModelInfo& info, const ParamValues& given, const Vec3<double>& wo) {
-              return bound(info, given).under(wo);
+              return bound_as<M>(info, given).under(wo);
             },
             nullptr, nullptr, nullptr};
   if constexpr (SamplesBesideUnder<M<double>>)
     out.sample = [](const ModelInfo& info, const ParamValues& fixed, const Vec3<Expr>& wo, const Vec3<Expr>& u,
-                    const Expr& stands) { return recorded(info, fixed).sample_beside_under(wo, u, stands); };
+                    const Expr& stands) { return recorded_as<M>(info, fixed).sample_beside_under(wo, u, stands); };
   if constexpr (HasWhole<M<double>>) {
-    out.record_whole = [](const ModelInfo& info, const ParamValues& fixed) { return recorded(info, fixed).whole(); };
-    out.bound_whole = [](const ModelInfo& info, const ParamValues& given) { return bound(info, given).whole(); };
+    out.record_whole = [](const ModelInfo& info, const ParamValues& fixed) {
+      return recorded_as<M>(info, fixed).whole();
+    };
+    out.bound_whole = [](const ModelInfo& info, const ParamValues& given) { return bound_as<M>(info, given).whole(); };
   }
   return out;
 }

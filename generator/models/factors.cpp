@@ -51,6 +51,7 @@
 // vectors everywhere. Elsewhere their pdf may be far too small, so some directions are matte ones in any case.
 #include "model/base_terms.h"
 #include "model/half_vector.h"
+#include "model/stand_in.h"
 
 namespace brdfc {
 namespace {
@@ -84,6 +85,29 @@ template <class V, std::size_t N, class T> V curve(const std::array<V, N>& at, c
   for (std::size_t k = 0; k + 1 < N; ++k) sum = sum + (at[k + 1] - at[k]) * passed[k];
   return sum;
 }
+
+/// Weights of the knots of d in the integrals of D over slopes, times powers 0 to 3 of y = ln(q - 1), the logarithm of
+/// the squared slope in units of a. There GGX, d = 1, has the logistic distribution e^-y / (1 + e^-y)^2. Between knots
+/// d is taken for linear.
+using SlopeMoments = std::array<std::array<double, 4>, kD.size()>;
+const SlopeMoments& slope_moments() {
+  static const SlopeMoments made = [] {
+    SlopeMoments out{};
+    constexpr double kEnd = 40, kStep = 1. / 256;
+    for (double y = -kEnd; y <= kEnd; y += kStep) {
+      const double x = std::log1p(std::exp(y)), weight = std::exp(-x) * -std::expm1(-x) * kStep;
+      const std::array<double, kD.size() - 1> part = passed(kD, x);
+      for (std::size_t k = 0; k < kD.size(); ++k) {
+        const double hat = (k == 0 ? 1 : part[k - 1]) - (k + 1 == kD.size() ? 0 : part[k]);
+        for (std::size_t power = 0; power < 4; ++power) out[k][power] += hat * weight * std::pow(y, double(power));
+      }
+    }
+    return out;
+  }();
+  return made;
+}
+/// Their variance of y for GGX.
+constexpr double kSpreadOfGgx = kPi * kPi / 3;
 
 }  // namespace
 
@@ -350,8 +374,57 @@ template <class T> struct Factors {
     Closure<T> matte(ClosureKind::Diffuse, rho * (matte_at(zo) * (T(1) - rim / T(6))));
     return {facets(ClosureKind::Ggx, weight, ax, ay, T(0)), matte};
   }
+
+  /// Two lobes of isotropic GGX facets and the matte part, for EEVEE. Together the lobes have the light, and the mean,
+  /// variance and skewness of the logarithm of slopes of D, unless D is narrower than GGX. Where the lobe widens
+  /// towards grazing views, so do they. Fresnel term and shadowing are taken at the mean heights of light and view.
+  ///
+  /// Light that is misplaced, for 26 of MERL's materials as others describe them: median 11 %, nine tenths below 21 %,
+  /// worst 55 % (the blue of a red paint, which has another width). A lobe about the mirror direction is round, those
+  /// of facets are not: 48 % for Phong's. A lobe that surrounds the normal as a ring, or cloth, has no such closures.
+  ClosureSum<T> stand_in(const Vec3<T>& wo) const {
+    Rgb<T> light(T(0)), here = d[0];
+    std::array<T, 4> moment = {T(0), T(0), T(0), T(0)};
+    for (std::size_t k = 0; k < kD.size(); ++k) {
+      // Slopes that reflect light from above to the side count little: d goes on from the knots before them.
+      if (k > 0) here = here + (d[k] - here) / sqr(T(1) + T(5) * ax * ay * T(std::expm1(kD[k])));
+      const T brightest = max_component(here);
+      light += here * T(slope_moments()[k][0]);
+      for (std::size_t i = 0; i < 4; ++i) moment[i] = moment[i] + brightest * T(slope_moments()[k][i]);
+    }
+    const T all = maximum(moment[0], tiny<T>());
+    const T mean = named("mean_y", moment[1] / all);
+    const T square = moment[2] / all, variance = square - sqr(mean);
+    const T skew = moment[3] / all - T(3) * mean * square + T(2) * mean * sqr(mean);
+    // Two logistic distributions at a distance, with the shares p(1 - p) = 1 / (4 + s^2): their variance exceeds that
+    // of one by p(1 - p) distance^2, and their skewness is s in units of that excess.
+    const T excess = named("excess", maximum(variance - T(kSpreadOfGgx), T(1e-4)));
+    const T s = minimum(maximum(skew / (excess * sqrt(excess)), T(-3)), T(3));
+    const T distance = sqrt(excess * (T(4) + sqr(s)));
+    const T wide = named("wide_share", T(0.5) - T(0.5) * s / sqrt(T(4) + sqr(s)));
+
+    // As form(), as far as one roughness can follow. The square of the mean height, as of a lobe about the mirror
+    // direction: the light is higher by the root of the lobe's width where the view is in the surface.
+    const T zo = maximum(wo.z, T(0)), sides = T(1) - sqr(zo), a = sqrt(ax * ay), w = T(1) - heights;
+    const T z2 = named("z2", sqr(zo) + minimum(a * exp(mean / T(2)), T(1)) * sides);
+    const T n = narrowing(z2), level = T(0.3) * heights * z2 / (z2 + sides);
+    const T area = named("area", T(1) / sqrt((n * (w + heights * sides / z2) + level) * (n * w + level)));
+    const auto alpha = [&](const T& y) { return minimum(maximum(a * exp(y / T(2)) * sqrt(area), T(1e-3)), T(1)); };
+    const T p2 = sqr(alpha(mean)) * sides;
+    const T zi = minimum(lobe_height(zo, T(0.5) * p2), T(1)), cosTheta_d = minimum(lobe_height(zo, p2), T(1));
+    const auto hidden = [&](const T& z) { return p2 / (T(2) * (sqrt(z * z + p2) + z)); };
+    const T inverse_smith = zi * zo + zi * hidden(zo) + zo * hidden(zi);
+    const Rgb<T> log_f = curve(logs(f), passed(kF, T(1) - cosTheta_d));
+    const T log_visible = log_visibility(zi) + log_visibility(zo) + log(strength + tiny<T>());
+    const Rgb<T> weight = exp(log(light + Rgb<T>(tiny<T>())) + log_f + Rgb<T>(log_visible)) *
+                          (inverse_smith * area / (least_height(zi) * least_height(zo)));
+    const auto lobe = [&](const T& share, const T& y) { return facets(ClosureKind::Ggx, weight * share, alpha(y)); };
+    return {lobe(T(1) - wide, mean - wide * distance), lobe(wide, mean + (T(1) - wide) * distance),
+            Closure<T>(ClosureKind::Diffuse, rho * (matte_at(zo) * (T(1) - rim / T(6))))};
+  }
 };
 
 BRDFC_MODEL(Factors)
+BRDFC_STAND_IN(Factors)
 
 }  // namespace brdfc

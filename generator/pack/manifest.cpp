@@ -11,6 +11,7 @@
 #include "fit/roles.h"
 #include "measure/bound_model.h"
 #include "measure/probes.h"
+#include "measure/read_parameters.h"
 #include "model/choices.h"
 #include "trace/program.h"
 
@@ -32,14 +33,7 @@ Readers readers(const Model& model) {
   const ModelInfo& info = model.info();
   Readers found;
   for (const Choices& choices : choice_combinations(info)) {
-    Recorder recorder(Precision::Double);
-    const std::unique_ptr<Brdf<Expr>> brdf = model.record(with_choices(info, choices));
-    const Vec3<Expr> wi = input3("wi"), wo = input3("wo");
-    Program light;
-    if (model.has_scatter()) light.output("f", brdf->eval(wi, wo));
-    if (model.has_mirror()) light.output("mirror", brdf->mirror(wo));
-    if (model.has_transmit()) light.output("transmit", brdf->transmit(wo));
-    for (const std::string& name : light.inputs()) {
+    for (const std::string& name : measure::read_parameters(model, with_choices(info, choices))) {
       auto& by_choice = found[name];
       by_choice.resize(choices.size());
       for (std::size_t i = 0; i < choices.size(); ++i) by_choice[i].insert(choices[i]);
@@ -97,17 +91,18 @@ Json parameters_json(const Model& model, const ParamValues& fixed) {
   return list;
 }
 
-Json error_json(const forms::FormError& e) {
-  return {{"relative_l1", e.relative_l1 ? Json(*e.relative_l1) : Json()},
-          {"relative_l2", e.relative_l2 ? Json(*e.relative_l2) : Json()},
-          {"albedo", e.albedo},
-          {"note", e.note}};
-}
-
 Json values_json(const ParamValues& values) {
   Json j = Json::object();
   for (const auto& [name, value] : values) j[name] = std::visit([](const auto& v) { return Json(v); }, value);
   return j;
+}
+
+Json error_json(const forms::FormError& e) {
+  return {{"relative_l1", e.relative_l1 ? Json(*e.relative_l1) : Json()},
+          {"relative_l2", e.relative_l2 ? Json(*e.relative_l2) : Json()},
+          {"albedo", e.albedo},
+          {"note", e.note},
+          {"at", values_json(e.at)}};
 }
 
 Json optical_json(const Model& model, const ParamValues& values) {

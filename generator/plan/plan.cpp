@@ -48,13 +48,14 @@ std::optional<std::string> unfit(const Needs& needs, const Form& form) {
   const Model& model = *needs.front()->model;
   const ParamValues fixed = constants(needs);
   // Reasons that hold for any values are tested before those that depend on values.
-  if (!model.has_scatter() || !form.made_of_fit()) return form.why_not(model, fixed);
+  if (!model.has_scatter() || !form.made_of_fit() || form.serves(model, fit::Role::Open))
+    return form.why_not(model, fixed);
   std::optional<std::string> axis;
   const fit::Roles& roles = fit::roles_of(model, fixed);
   for (const ParamInfo& p : model.info().params) {
     const fit::Role role = roles.of(p.name);
-    const bool along = p.kind == ParamKind::Number && form.serves(fit::Role::Axis);
-    if (role == fit::Role::Constant || (form.serves(role) && role != fit::Role::Axis)) continue;
+    const bool along = p.kind == ParamKind::Number && form.serves(model, fit::Role::Axis);
+    if (role == fit::Role::Constant || (form.serves(model, role) && role != fit::Role::Axis)) continue;
     const std::string how = how_it_varies(p.name, needs);
     if (!along) return how;
     if (axis) return fmt::format("{}; {}", *axis, how);

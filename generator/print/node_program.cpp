@@ -480,7 +480,7 @@ NodeProgram node_program(const Program& program, const std::set<std::string>& ve
 }
 
 NodePrograms node_programs(const Program& program, const std::set<std::string>& varying, const std::string& prefix,
-                           const std::set<std::string>& vectors, const std::set<std::string>& of_some) {
+                           const std::vector<std::set<std::string>>& outputs, const std::set<std::string>& vectors) {
   const Program p = lowered_to_nodes(program);
   const std::vector<bool>& reachable = p.reachable();
   std::vector<bool> varies(reachable.size());
@@ -502,10 +502,13 @@ NodePrograms node_programs(const Program& program, const std::set<std::string>& 
       for (int a : n.args) pass(a);
   }
   for (const auto& [name, id] : p.outputs()) pass(id);
-  auto some = p.outputs();
-  std::erase_if(some, [&](const auto& output) { return !of_some.count(output.first); });
-  return {Writer(p, {}, vectors).write(passed), Writer(p, cuts, vectors).write(p.outputs()),
-          Writer(p, cuts, vectors).write(some)};
+  NodePrograms out{Writer(p, {}, vectors).write(passed), {}};
+  for (const std::set<std::string>& names : outputs) {
+    auto wanted = p.outputs();
+    std::erase_if(wanted, [&](const auto& output) { return !names.count(output.first); });
+    out.each.push_back(Writer(p, cuts, vectors).write(wanted));
+  }
+  return out;
 }
 
 }  // namespace brdfc::print

@@ -59,15 +59,15 @@ bool has_nodes(const Program&);
 /// one node each.
 NodeProgram node_program(const Program&, const std::set<std::string>& vectors = {});
 
-/// The program split into two, for programs that run several times while only some of the inputs change.
+/// A program split into several, of which some run several times while only some of the inputs change.
 struct NodePrograms {
-  NodeProgram
-      once;  ///< everything that does not depend on the varying inputs; some of its outputs are inputs of `each`
-  NodeProgram each;
-  NodeProgram some;  ///< what of `each` computes the outputs `of_some`
+  NodeProgram once;               ///< what does not depend on the varying inputs
+  std::vector<NodeProgram> each;  ///< the rest, for each list of outputs; outputs of `once` are inputs
 };
-/// `prefix`: the names of values passed from one to the other begin with it.
+/// `outputs`: names of the program's outputs; those that none of the lists contains are left out. `prefix`: the names
+/// of values passed from `once` begin with it.
 NodePrograms node_programs(const Program&, const std::set<std::string>& varying, const std::string& prefix,
-                           const std::set<std::string>& vectors = {}, const std::set<std::string>& of_some = {});
+                           const std::vector<std::set<std::string>>& outputs,
+                           const std::set<std::string>& vectors = {});
 
 }  // namespace brdfc::print

@@ -663,6 +663,8 @@ def test_a_file_that_is_none_is_refused(extension, empty, tmp_path, content, sai
     materials = len(bpy.data.materials)
     with pytest.raises(extension.api.MeasuredError, match=said):
         extension.api.new_measured_material(path)
+    with pytest.raises(extension.api.MeasuredError, match="is a folder: New Measured Library"):
+        extension.api.measured_fits(str(tmp_path))
     with pytest.raises(extension.api.MeasuredError, match="There is no file"):
         extension.api.new_measured_material(tmp_path / "none.binary")
     assert len(bpy.data.materials) == materials

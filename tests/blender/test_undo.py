@@ -198,7 +198,7 @@ def test_details_say_what_the_panel_leaves_out(extension, start):
     start("oren_nayar", representation="fitted")
     (node,) = extension.model_nodes.group_nodes(bpy.context.object.active_material)
     form, _ = extension.model_nodes.manifest_entry(node)
-    assert extension.ui.error_text(form).endswith(" %")
+    assert extension.ui.error_text(form["error"]).endswith(" %")
     lines = extension.ui.details(node, form)
     assert any(line.startswith("Fraction of the reflected light") for line in lines)
     assert any("Closures of Cycles: " in line for line in lines)
@@ -207,4 +207,4 @@ def test_details_say_what_the_panel_leaves_out(extension, start):
     assert state() == before
     for model, entry in extension.api.models().items():
         for form in entry["representations"].values():
-            assert "L1" not in extension.ui.error_text(form), model
+            assert "L1" not in extension.ui.error_text(form["error"]), model

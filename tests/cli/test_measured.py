@@ -410,6 +410,10 @@ def test_headers_are_read_as_programs_write_them(tmp_path):
     header = '"Theta_I" , PHI_I,"theta_o","phi_o",  R ,"G",b'
     file.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8-sig", newline="\r\n")
     assert told(file)["albedo"] == plain["albedo"] and told(file)["notes"] == plain["notes"]
+    # As numpy.savetxt writes headers, and with comments anywhere.
+    lines = ["# a felt", f"# {header}", "", *rows[:2], "#", " # 30 degrees", *rows[2:]]
+    file.write_text("\n".join(lines), encoding="utf-8-sig")
+    assert told(file)["albedo"] == plain["albedo"] and told(file)["notes"] == plain["notes"]
     rows = [f'"{row.split(",")[0]}",{row.split(",", 1)[1]},"a, b",7' for row in rows]
     file.write_text("\n".join([f"{header},Sample,Run", *rows]), encoding="utf-8")
     said = told(file)
