@@ -174,12 +174,14 @@ def new_measured_material(found, model=None, representation="auto"):
     """Makes a material that comes close to a measured BRDF.
 
     `found`: a file, or what measured_fits() returned of it. `model`: one of the models, or "lobes"
-    for the sum of several; without it the model that comes closest. Where the fit has a matte part,
-    the light of a Diffuse node is added to the model's. Where it is `turned`, nodes turn the
-    tangent. Raises ValueError, and what measured_fits() and new_material() raise.
+    for the sum of several; without it the model that comes closest. Only that is fitted to a file.
+    The material has no fake user: Blender saves it with the file if something uses it. Where the
+    fit has a matte part, the light of a Diffuse node is added to the model's. Where it is `turned`,
+    nodes turn the tangent. Raises ValueError, and what measured_fits() and new_material() raise.
     """
+    measured.check_model(model, representation)
     if not isinstance(found, Measured):
-        found = measured_fits(found)
+        found = measured.fitting_of(found, model).wait()
     if model == measured.SUM:
         return new_sum(found.lobe_sum().lobes, representation, found.path.stem)
     fit = found.fit(model)

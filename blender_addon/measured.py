@@ -187,6 +187,25 @@ class Measured:
         )
 
 
+def check_model(model, representation):
+    """Raises ValueError unless a material can be made of a fit of this model, or of SUM, or of the
+    closest one, if it is None."""
+    names = pack.model_names()
+    if model is not None and model not in (*names, SUM):
+        known = ", ".join([*names, SUM])
+        raise ValueError(
+            say("Expected one of the models {models}, got {got!r}", models=known, got=model)
+        )
+    if model in names:
+        pack.model(model).resolve(representation)
+
+
+def fitting_of(path, model):
+    """Fits no more to a file than a material of this model needs, as in check_model()."""
+    models = {None: "all", SUM: "none"}.get(model, model)
+    return Fitting(path, models, sums=model == SUM)
+
+
 class Fitting(ToolJob):
     """Runs the program brdfc to make a Measured of a file, while Blender stays usable."""
 

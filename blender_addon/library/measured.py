@@ -21,8 +21,7 @@ from ..common.i18n import say
 from ..common.jobs import Job, ProgramJob
 from ..common.program import find
 from ..content import kept_groups
-from ..measured import ENDINGS, SUM, Fitting, Fittings, MeasuredError
-from ..packs import pack
+from ..measured import ENDINGS, SUM, Fittings, MeasuredError, check_model, fitting_of
 from . import (
     BLEND,
     CATALOGS,
@@ -104,8 +103,7 @@ class Making(Job):
         return _FITS
 
     def _fitting(self, path):
-        models = {None: "all", SUM: "none"}.get(self._model, self._model)
-        return Fitting(path, models, sums=self._model == SUM)
+        return fitting_of(path, self._model)
 
     def _build(self):
         share = self._building.step()
@@ -251,14 +249,7 @@ def _check(folder, blend, model, representation):
     if bpy.data.filepath and Path(bpy.data.filepath).absolute() == blend:
         raise ValueError(say("{file} is the file that is open: choose another name", file=blend))
     _check_replaced(blend)
-    names = pack.model_names()
-    if model is not None and model not in (*names, SUM):
-        known = ", ".join([*names, SUM])
-        raise ValueError(
-            say("Expected one of the models {models}, got {got!r}", models=known, got=model)
-        )
-    if model in names:
-        pack.model(model).resolve(representation)
+    check_model(model, representation)
 
 
 def _check_replaced(blend):

@@ -79,6 +79,23 @@ def test_what_a_file_holds(paint, found):
         found.fit("lunar_lambert")
 
 
+def test_only_the_model_of_the_material_is_fitted(extension, empty, paint, monkeypatch):
+    asked = []
+    fitting = extension.api.measured.Fitting
+
+    def recorded(path, models, sums):
+        asked.append((models, sums))
+        return fitting(path, models, sums)
+
+    monkeypatch.setattr(extension.api.measured, "Fitting", recorded)
+    extension.api.new_measured_material(paint, "ward")
+    with pytest.raises(ValueError, match="Expected one of the models .*lobes, got 'wood'"):
+        extension.api.new_measured_material(paint, "wood")
+    with pytest.raises(ValueError, match="has no render method"):
+        extension.api.new_measured_material(paint, "ward", "exact")
+    assert asked == [("ward", False)]
+
+
 @FITS
 @pytest.mark.parametrize("model", ["ward", "factors"])
 def test_a_material_of_a_file(extension, empty, found, model):

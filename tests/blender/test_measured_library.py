@@ -186,7 +186,7 @@ def test_the_part_done_never_falls(module, folder, tmp_path, monkeypatch):
             self.result = self.path.name
             return None
 
-    monkeypatch.setattr(module, "Fitting", Fitting)
+    monkeypatch.setattr(module, "fitting_of", Fitting)
     making = module.Making(folder, tmp_path / "measured.blend", "lambert")
     shares = [making.step() for _ in range(3 * 4)]
     assert shares == sorted(shares) and shares[2] == pytest.approx(shares[-1] / 4)
