@@ -71,6 +71,7 @@ FormError error_of_stand_in(const Model& model, const ParamValues& fixed) {
   FormError out = error_of_fit(stand_in_errors(model, fixed), "Blender's nodes, computed from the parameters");
   out.at = complete(model.info(), {});
   for (const auto& [name, value] : fixed) out.at.erase(name);
+  if (!out.at.empty()) out.note += ", with the default parameters";
   return out;
 }
 

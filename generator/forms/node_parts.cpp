@@ -220,8 +220,9 @@ NodeProgram record_lobe() {
 }
 NodeProgram record_rest() {
   return recorded([](Program& p) {
-    const Expr density = maximum(Expr::input("density"), tiny<Expr>());
-    const Rgb<Expr> weight = Rgb<Expr>::input("value") * ((Expr(1.0) - Expr::input("lost")) / density);
+    // SVM takes a quotient by 0 for 0: such a direction is none.
+    const Expr left = (Expr(1.0) - Expr::input("lost")) / Expr::input("density");
+    const Rgb<Expr> weight = Rgb<Expr>::input("value") * left;
     p.output("color", weight * kept(max_component(weight), Expr::input("u")));
   });
 }

@@ -204,7 +204,7 @@ TEST_P(NodesOfModels, AreTheRecording) {
       given["wi"] = found.at("drawn");
       const NodeValues there = run(nodes.each[0], given);
       for (std::size_t c = 0; c < 3; ++c)
-        found["weight"][c] = there.at("value")[c] / std::max(there.at("pdf")[0], std::numeric_limits<float>::min());
+        found["weight"][c] = there.at("pdf")[0] == 0 ? 0 : there.at("value")[c] / there.at("pdf")[0];
       for (std::size_t c = 0; c < 3; ++c) {
         const float x = found.at("drawn")[c];
         found[std::string("drawn_") + "xyz"[c]] = {x, x, x};
