@@ -3,7 +3,7 @@
 them: for models whose parameters are usually far from those that twins with tables are fitted
 to."""
 
-from .part_groups import Parts, make_group
+from .part_groups import Parts, add_group, make_group
 from .wiring import Wiring
 
 
@@ -39,12 +39,9 @@ def wire(tree, data, normal, parameters, title):
     outputs = [["BSDF", "SHADER"], ["Albedo", "VECTOR"]]
     group = make_group(f"{title}: closures", [data, inputs], inputs, outputs, fill, kept=True)
     w = Wiring(tree)
-    node = w.node("ShaderNodeGroup")
-    node.node_tree = group
-    for socket in node.inputs:
-        w.give(socket, sockets[socket.name][0])
+    made = add_group(w, group, {name: value for name, (value, _) in sockets.items()}, "")
     w.place_nodes()
-    return node.outputs["BSDF"], node.outputs["Albedo"]
+    return made["BSDF"], made["Albedo"]
 
 
 def _wired(w, data, normal, parameters, title):

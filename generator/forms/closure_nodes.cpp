@@ -24,9 +24,12 @@ Json record_closure(const Closure<Expr>& c, std::size_t index, Program& program)
     throw std::logic_error("a stand-in has a closure that EEVEE lacks");
   const std::string weight = fmt::format("weight_{}", index), roughness = fmt::format("roughness_{}", index);
   program.output(weight, c.weight);
-  if (!has_facets(c.kind)) return {{"kind", "diffuse"}, {"weight", weight}};
-  program.output(roughness, sqrt(c.alpha));
-  return {{"kind", c.kind == ClosureKind::Ggx ? "ggx" : "beckmann"}, {"weight", weight}, {"roughness", roughness}};
+  Json closure = {{"kind", kind_of(c.kind)}, {"weight", weight}};
+  if (has_facets(c.kind)) {
+    program.output(roughness, sqrt(c.alpha));
+    closure["roughness"] = roughness;
+  }
+  return closure;
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <stdexcept>
+
 #include "forms/node_lamps.h"
 #include "model/horizon.h"
 #include "trace/program.h"
@@ -66,6 +68,26 @@ Json json_of(const NodeProgram& program) {
   for (const auto& [name, o] : program.outputs)
     outputs.push_back({name, o.color ? "VECTOR" : "FLOAT", operand_json(o)});
   return {{"inputs", inputs}, {"operations", operations}, {"outputs", outputs}, {"live", program.live}};
+}
+
+const char* kind_of(ClosureKind kind) {
+  switch (kind) {
+    case ClosureKind::Diffuse:
+    case ClosureKind::OrenNayar:  // the same node, with a roughness
+      return "diffuse";
+    case ClosureKind::DiffuseToon:
+      return "cone";
+    case ClosureKind::Ggx:
+      return "ggx";
+    case ClosureKind::Beckmann:
+      return "beckmann";
+    case ClosureKind::Reflection:
+      return "mirror";
+    case ClosureKind::Refraction:
+      return "refraction";
+    default:
+      throw std::logic_error("a closure that no node makes");
+  }
 }
 
 Json bounds_json(const ModelInfo& info, const ParamValues& fixed) {

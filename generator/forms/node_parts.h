@@ -6,6 +6,7 @@
 #include <set>
 #include <string>
 
+#include "closures/closure.h"
 #include "model/model.h"
 #include "print/node_program.h"
 
@@ -14,6 +15,8 @@ namespace brdfc::forms {
 /// Names of the inputs and outputs of parts that are vectors.
 const std::set<std::string>& node_vectors();
 nlohmann::ordered_json json_of(const print::NodeProgram&);
+/// The extension's name of the node that makes a closure. Throws std::logic_error if none does.
+const char* kind_of(ClosureKind);
 /// The ranges of the numbers and colours that are not fixed, by name, as links may give them any value.
 nlohmann::ordered_json bounds_json(const ModelInfo&, const ParamValues& fixed);
 

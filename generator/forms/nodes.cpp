@@ -33,23 +33,6 @@ using print::NodeProgram;
 bool is_native(ClosureKind kind) {
   return kind == ClosureKind::Diffuse || kind == ClosureKind::Reflection || kind == ClosureKind::Refraction;
 }
-const char* kind_of(ClosureKind kind) {
-  switch (kind) {
-    case ClosureKind::Diffuse:
-    case ClosureKind::OrenNayar:  // the same node, with a roughness
-      return "diffuse";
-    case ClosureKind::DiffuseToon:
-      return "cone";
-    case ClosureKind::Ggx:
-      return "ggx";
-    case ClosureKind::Beckmann:
-      return "beckmann";
-    case ClosureKind::Reflection:
-      return "mirror";
-    default:
-      return "refraction";
-  }
-}
 
 /// The closures that equal the model, if all of them exist as nodes. Choices must be bound.
 std::optional<ClosureSum<Expr>> native_closures(const Model& model, const Brdf<Expr>& brdf) {

@@ -12,27 +12,13 @@
 #include "fit/roles.h"
 #include "forms/closure_nodes.h"
 #include "forms/made_of_fit.h"
+#include "forms/node_parts.h"
 #include "model/stand_in.h"
 
 namespace brdfc::forms {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-const char* node_of(ClosureKind kind) {
-  switch (kind) {
-    case ClosureKind::Ggx:
-      return "ggx";
-    case ClosureKind::Beckmann:
-      return "beckmann";
-    case ClosureKind::Diffuse:
-      return "diffuse";
-    case ClosureKind::Reflection:
-      return "mirror";
-    default:
-      throw std::logic_error("a twin with a closure that no node makes");
-  }
-}
 
 /// The table in single precision, as nodes compute. One row per place of the axis; a single row without an axis.
 Json rows_of(const fit::TablePtr& table) {
@@ -128,7 +114,7 @@ Shader Twin::write(const Model& model, const measure::AlbedoTable&, const Settin
   Json closures = Json::array();
   for (const fit::TwinClosure& part : twin.parts()) {
     if (black(part)) continue;
-    Json j = {{"kind", node_of(part.kind)}, {"weight", by_term(part.weight)}};
+    Json j = {{"kind", kind_of(part.kind)}, {"weight", by_term(part.weight)}};
     if (has_facets(part.kind)) {
       j["lean"] = rows_of(part.lean);
       j["roughness"] = rows_of(part.roughness);

@@ -19,9 +19,11 @@ struct StandIn {
   ClosureSum<double> (*bound)(const ModelInfo&, const ParamValues&, const Vec3<double>& wo);
 };
 /// That of the model, or a null pointer.
-const StandIn* stand_in(const Model&);
+inline const StandIn* stand_in(const Model& model) { return beside<StandIn>(model); }
 /// Called by BRDFC_STAND_IN before main().
-bool register_stand_in(const std::string& name, const StandIn&);
+inline bool register_stand_in(const std::string& name, const StandIn& closures) {
+  return registered_beside<StandIn>().emplace(name, closures).second;
+}
 
 namespace detail {
 

@@ -38,11 +38,13 @@ struct Under {
   double (*bound_whole)(const ModelInfo&, const ParamValues&);
 };
 /// That of the model, or a null pointer.
-const Under* under(const Model&);
+inline const Under* under(const Model& model) { return beside<Under>(model); }
 /// Whether the model's base is all of it for some parameters.
 inline bool has_whole(const Model& model) { return under(model) && under(model)->record_whole; }
 /// Called by BRDFC_UNDER before main().
-bool register_under(const std::string& name, const Under&);
+inline bool register_under(const std::string& name, const Under& closures) {
+  return registered_beside<Under>().emplace(name, closures).second;
+}
 
 /// A term that depends on the polar angle of the light alone, from below: two cones about the normal. Their sum has
 /// `heights` at the normal and at the first of `angles`, is linear between, and 0 from the second on. Angles are in

@@ -358,6 +358,14 @@ template <class T> struct Factors {
     return sample_if(above(wi, wo) && p > T(0), wi, eval(wi, wo) * (wi.z / maximum(p, tiny<T>())), p);
   }
 
+  /// (n.i) (n.o) over Smith's correlated shadowing of GGX facets, for heights of light and view. `p2` is the square of
+  /// the roughness times the sine.
+  static T inverse_smith(const T& zi, const T& zo, const T& p2) {
+    // (n.w) Lambda.
+    const auto hidden = [&](const T& z) { return p2 / (T(2) * maximum(sqrt(z * z + p2) + z, tiny<T>())); };
+    return zi * zo + zo * hidden(zi) + zi * hidden(zo);
+  }
+
   /// GGX facets and the matte part. The facets' weight is that of the curves over those of Cycles' facets, which have
   /// d = F = 1 and Smith's correlated shadowing, at a frequent slope and where the lobe is at its mean height. They
   /// fade where the lobe is not one of facets: stretched as form() is, they lacked half of fitted lobes about the
@@ -366,11 +374,8 @@ template <class T> struct Factors {
     const T zo = maximum(wo.z, T(0)), p2 = sqr(ax * wo.x) + sqr(ay * wo.y);
     const T facets_share = named("facets_share", clamp01(T(1) - abs(widening) - T(4) * heights));
     const T zi = lobe_height(zo, T(0.7) * p2);
-    // (n.w) Lambda.
-    const auto hidden = [&](const T& z) { return p2 / (T(2) * maximum(sqrt(z * z + p2) + z, tiny<T>())); };
-    const T inverse_smith = zi * zo + zo * hidden(zi) + zi * hidden(zo);
     const Rgb<T> weight = product(T(kLn2), T(1) - zi, log_visibility(zi) + log_visibility(zo)) *
-                          (T(0.92) * inverse_smith / (least_height(zi) * least_height(zo)) * facets_share);
+                          (T(0.92) * inverse_smith(zi, zo, p2) / (least_height(zi) * least_height(zo)) * facets_share);
     Closure<T> matte(ClosureKind::Diffuse, rho * (matte_at(zo) * (T(1) - rim / T(6))));
     return {facets(ClosureKind::Ggx, weight, ax, ay, T(0)), matte};
   }
@@ -412,12 +417,10 @@ template <class T> struct Factors {
     const auto alpha = [&](const T& y) { return minimum(maximum(a * exp(y / T(2)) * sqrt(area), T(1e-3)), T(1)); };
     const T p2 = sqr(alpha(mean)) * sides;
     const T zi = minimum(lobe_height(zo, T(0.5) * p2), T(1)), cosTheta_d = minimum(lobe_height(zo, p2), T(1));
-    const auto hidden = [&](const T& z) { return p2 / (T(2) * (sqrt(z * z + p2) + z)); };
-    const T inverse_smith = zi * zo + zi * hidden(zo) + zo * hidden(zi);
     const Rgb<T> log_f = curve(logs(f), passed(kF, T(1) - cosTheta_d));
     const T log_visible = log_visibility(zi) + log_visibility(zo) + log(strength + tiny<T>());
     const Rgb<T> weight = exp(log(light + Rgb<T>(tiny<T>())) + log_f + Rgb<T>(log_visible)) *
-                          (inverse_smith * area / (least_height(zi) * least_height(zo)));
+                          (inverse_smith(zi, zo, p2) * area / (least_height(zi) * least_height(zo)));
     const auto lobe = [&](const T& share, const T& y) { return facets(ClosureKind::Ggx, weight * share, alpha(y)); };
     return {lobe(T(1) - wide, mean - wide * distance), lobe(wide, mean + (T(1) - wide) * distance),
             Closure<T>(ClosureKind::Diffuse, rho * (matte_at(zo) * (T(1) - rim / T(6))))};
